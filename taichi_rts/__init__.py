@@ -1,0 +1,41 @@
+"""Spatially varying time stepping for weakly compressible SPH, on Taichi. Importing starts nothing; call `init`."""
+
+from taichi_rts.backend import init
+from taichi_rts.diagnostics import Energy
+from taichi_rts.errors import (
+    BackendError,
+    Error,
+    OutputError,
+    RenderError,
+    SceneError,
+    SimulationDivergedError,
+    StepperError,
+    TimeError,
+)
+from taichi_rts.scene import Block, Box, Scene, View, load_scene, scene_names
+from taichi_rts.simulation import Simulation
+from taichi_rts.stepping.regional import Regional
+from taichi_rts.stepping.uniform import Uniform
+
+__version__ = "0.1.0"
+__all__ = [
+    "BackendError",
+    "Block",
+    "Box",
+    "Energy",
+    "Error",
+    "OutputError",
+    "Regional",
+    "RenderError",
+    "Scene",
+    "SceneError",
+    "Simulation",
+    "SimulationDivergedError",
+    "StepperError",
+    "TimeError",
+    "Uniform",
+    "View",
+    "init",
+    "load_scene",
+    "scene_names",
+]

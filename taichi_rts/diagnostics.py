@@ -1,0 +1,82 @@
+"""What a run is judged by: energy, momentum, and how much work each level did."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from taichi_rts.physics.medium import Medium
+from taichi_rts.scene import Scene
+
+
+class Energy(NamedTuple):
+    """Energies [J] (per metre of depth in two dimensions); `potential` is 0 at the domain's floor."""
+
+    kinetic: float
+    potential: float
+    internal: float
+
+    @property
+    def total(self) -> float:
+        """The sum of the three [J]."""
+        return self.kinetic + self.potential + self.internal
+
+
+def measure_energy(
+    scene: Scene, medium: Medium, positions: np.ndarray, velocities: np.ndarray, densities: np.ndarray
+) -> Energy:
+    """Sum kinetic, potential and internal energy [J] of particles in a fixed order, in double precision."""
+    x, v, rho = (np.asarray(array, dtype=np.float64) for array in (positions, velocities, densities))
+    height = -(x @ np.asarray(scene.acceleration)) - scene.floor_potential
+    return Energy(
+        kinetic=float(0.5 * medium.mass * (v * v).sum()),
+        potential=float(medium.mass * height.sum()),
+        internal=float(medium.mass * medium.equation_of_state.specific_energy(rho).sum()),
+    )
+
+
+@dataclass
+class Tally:
+    """Work done so far. Counts per level start at level 1."""
+
+    count: int
+    levels: int
+    base_steps: int = 0
+    wall_seconds: float = 0.0
+    particle_steps: list[int] = field(default_factory=list)
+    updates: list[int] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.particle_steps = [0] * self.levels
+        self.updates = [0] * self.levels
+
+    def add(self, steps: int, particle_steps: Sequence[int], updates: Sequence[int]) -> None:
+        """Add `steps` steps with their counts per level; empty counts stand for every particle at level 1."""
+        self.base_steps += steps
+        everybody = [steps * self.count]
+        for k, n in enumerate(particle_steps or everybody):
+            self.particle_steps[k] += n
+        for k, n in enumerate(updates or everybody):
+            self.updates[k] += n
+
+    def statistics(self) -> dict[str, Any]:
+        """Return the counts as a plain dict; fractions per level are averages over all particles and steps."""
+        total = max(1, sum(self.particle_steps))
+        updates = sum(self.updates)
+        return {
+            "base_steps": self.base_steps,
+            "particle_updates": updates,
+            "wall_seconds": self.wall_seconds,
+            "active_fraction": updates / total if self.base_steps else 1.0,
+            "level_fractions": [n / total for n in self.particle_steps],
+            "update_fractions": [n / max(1, updates) for n in self.updates],
+        }
+
+
+def speedup_bound(level_fractions: Sequence[float]) -> float:
+    """Upper bound for the speed-up over uniform steps of the base step: 1 / sum_n f_n / n, with no overhead at all."""
+    work = sum(f / n for n, f in enumerate(level_fractions, start=1))
+    return 1.0 / work if work > 0.0 else 1.0

@@ -1,0 +1,35 @@
+"""Everything a user can cause derives from `Error` and says the value, the limit and the remedy."""
+
+from __future__ import annotations
+
+
+class Error(Exception):
+    """Base of all errors that a user can cause; the command line turns it into one line and exit code 2."""
+
+
+class BackendError(Error, RuntimeError):
+    """The requested arch or precision is not available, or nothing was initialised."""
+
+
+class SceneError(Error, ValueError):
+    """A scene, or a file or name that should give one, is not valid."""
+
+
+class StepperError(Error, ValueError):
+    """A stepper's parameters are not valid."""
+
+
+class TimeError(Error, ValueError):
+    """A time was asked for that lies in the past or is not a number."""
+
+
+class OutputError(Error, OSError):
+    """Something cannot be written where it was asked for."""
+
+
+class RenderError(Error, RuntimeError):
+    """A picture or a window cannot be made."""
+
+
+class SimulationDivergedError(Error, ArithmeticError):
+    """The state stopped being finite."""

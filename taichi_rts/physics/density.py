@@ -1,0 +1,79 @@
+"""Density by summation, and the pass that gives every due particle its density and pressure."""
+
+import taichi as ti
+
+from taichi_rts.backend import Backend
+from taichi_rts.grid import BlockGrid, make_neighbour_sum
+from taichi_rts.particles import Neighbourhood, Particles
+from taichi_rts.physics.medium import Medium
+from taichi_rts.physics.walls import Walls
+
+
+@ti.data_oriented
+class SummationDensity:
+    """rho_i = sum_j m W_ij + sum_b rho_0 V_b W_ib (Monaghan 1992; walls: Akinci et al. 2012, Eq. 6).
+
+    With `Particles.rho_rate` present its rate d rho_i/dt = sum_j m v_ij . grad W_ij comes out of the same loop (walls are
+    at rest), so that the density of a particle that is not due can be extrapolated.
+    """
+
+    def __init__(
+        self,
+        particles: Particles,
+        near: Neighbourhood,
+        grid: BlockGrid,
+        walls: Walls | None,
+        medium: Medium,
+        backend: Backend,
+    ) -> None:
+        self.particles = particles
+        self.near = near
+        self.grid = grid
+        self.walls = walls
+        self.has_walls = walls is not None
+        self.equation_of_state = medium.equation_of_state
+        self.with_rate = particles.has_rho_rate
+        kernel, mass, rest_density = medium.kernel, medium.mass, medium.rest_density
+        tiny = (1e-6 * medium.support) ** 2
+        width = 2 if self.with_rate else 1
+
+        @ti.func
+        def contribution(x_ij, v_ij):
+            """W and, if wanted, v . grad W."""
+            d = ti.sqrt(x_ij.norm_sqr() + tiny)
+            value = ti.Vector.zero(backend.dtype, width)
+            value[0] = kernel.value(d)
+            if ti.static(width == 2):
+                value[1] = kernel.gradient_factor(d) * v_ij.dot(x_ij)
+            return value
+
+        @ti.func
+        def fluid_pair(i, j):
+            return mass * contribution(near.x[i] - near.x[j], near.v[i] - near.v[j])
+
+        @ti.func
+        def wall_pair(i, b):
+            return rest_density * walls.volume[b] * contribution(near.x[i] - walls.x[b], near.v[i])
+
+        geometry, support = grid.geometry, medium.support
+        self.sum_fluid = make_neighbour_sum(geometry, grid.start, support, fluid_pair, width, backend)
+        if walls is not None:
+            self.sum_walls = make_neighbour_sum(geometry, walls.start, support, wall_pair, width, backend)
+
+    @ti.kernel
+    def update(self, due: ti.template(), due_count: ti.template()):
+        """Find density [kg/m^3] and p/rho^2 of the due particles, which stand at places `due[0 .. due_count]`."""
+        for n in range(due_count[None]):
+            k = due[n]
+            i = self.grid.order[k]
+            x = self.near.x[k]
+            total = self.sum_fluid(k, x)
+            if ti.static(self.has_walls):
+                if self.walls.near[self.grid.block(i)] == 1:
+                    total += self.sum_walls(k, x)
+            rho = total[0]
+            self.near.rho[k] = rho
+            self.near.p_over_rho2[k] = self.equation_of_state.pressure(rho) / (rho * rho)
+            self.particles.rho[i] = rho
+            if ti.static(self.with_rate):
+                self.particles.rho_rate[i] = total[1]

@@ -1,0 +1,38 @@
+"""The constants every formulation needs, worked out once from a scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from taichi_rts.physics.equation_of_state import Tait
+from taichi_rts.scene import Scene
+from taichi_rts.smoothing import make_kernel
+
+
+@dataclass(frozen=True)
+class Medium:
+    """The fluid as the solver sees it.
+
+    `mass` m of a particle [kg], `rest_density` rho_0 [kg/m^3], `support` radius r [m], `sound_speed` c_s [m/s], the
+    smoothing `kernel` and the `equation_of_state`.
+    """
+
+    mass: float
+    rest_density: float
+    support: float
+    sound_speed: float
+    kernel: Any
+    equation_of_state: Tait
+
+    @classmethod
+    def of(cls, scene: Scene, mass: float) -> Medium:
+        """Work out the constants of `scene` for particles of `mass` [kg]."""
+        return cls(
+            mass=mass,
+            rest_density=scene.rest_density,
+            support=scene.support,
+            sound_speed=scene.wave_speed,
+            kernel=make_kernel(scene.kernel, scene.dim, scene.support),
+            equation_of_state=Tait(scene.rest_density, scene.wave_speed),
+        )

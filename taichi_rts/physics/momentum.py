@@ -1,0 +1,100 @@
+"""The momentum equation: gravity, pressure and whatever viscosity terms the scene has, in one loop over neighbours."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import taichi as ti
+
+from taichi_rts.backend import Backend
+from taichi_rts.grid import BlockGrid, make_neighbour_sum
+from taichi_rts.particles import Neighbourhood
+from taichi_rts.physics.medium import Medium
+from taichi_rts.physics.walls import Walls
+
+
+@ti.data_oriented
+class Pressure:
+    """a_i = -sum_j m (p_i/rho_i^2 + p_j/rho_j^2) grad W_ij (Monaghan 1992; Becker & Teschner 2007, Eq. 6).
+
+    Against a wall p_b = p_i and rho_b = rho_0 (mirrored pressure): -sum_b rho_0 V_b (p_i/rho_i^2 + p_i/rho_0^2) grad W_ib.
+    """
+
+    def __init__(self, near: Neighbourhood, rest_density: float) -> None:
+        self.near = near
+        self.rest_density = rest_density
+
+    @ti.func
+    def fluid_pair(self, i, j, x_ij, d2):
+        """Acceleration per unit of m times the gradient factor."""
+        return -(self.near.p_over_rho2[i] + self.near.p_over_rho2[j]) * x_ij
+
+    @ti.func
+    def wall_pair(self, i, b, x_ib, d2):
+        """Acceleration per unit of rho_0 V_b times the gradient factor."""
+        ratio = self.near.rho[i] * (1.0 / self.rest_density)
+        return -self.near.p_over_rho2[i] * (1.0 + ratio * ratio) * x_ib
+
+
+@ti.data_oriented
+class MomentumEquation:
+    """Adds up the terms' accelerations for one particle.
+
+    A term is an object with two ti.funcs, `fluid_pair(i, j, x_ij, d2)` and `wall_pair(i, b, x_ib, d2)`, that return the
+    acceleration per unit of mass times gradient factor (see `smoothing`), as a vector.
+    """
+
+    def __init__(
+        self,
+        terms: Sequence[Any],
+        near: Neighbourhood,
+        grid: BlockGrid,
+        walls: Walls | None,
+        medium: Medium,
+        gravity: Sequence[float],
+        backend: Backend,
+    ) -> None:
+        self.grid = grid
+        self.near = near
+        self.walls = walls
+        self.has_walls = walls is not None
+        self.gravity = tuple(gravity)
+        dim = grid.geometry.dim
+        kernel, mass, rest_density = medium.kernel, medium.mass, medium.rest_density
+        support = medium.support
+        tiny = (1e-6 * support) ** 2  # keeps grad W of a particle on itself, which is zero, from becoming 0/0
+        terms = list(terms)
+
+        @ti.func
+        def fluid_pair(i, j):
+            x_ij = near.x[i] - near.x[j]
+            d2 = x_ij.norm_sqr()
+            acceleration = ti.Vector.zero(backend.dtype, dim)
+            for term in ti.static(terms):
+                acceleration += term.fluid_pair(i, j, x_ij, d2)
+            return mass * kernel.gradient_factor(ti.sqrt(d2 + tiny)) * acceleration
+
+        @ti.func
+        def wall_pair(i, b):
+            x_ib = near.x[i] - walls.x[b]
+            d2 = x_ib.norm_sqr()
+            acceleration = ti.Vector.zero(backend.dtype, dim)
+            for term in ti.static(terms):
+                acceleration += term.wall_pair(i, b, x_ib, d2)
+            return rest_density * walls.volume[b] * kernel.gradient_factor(ti.sqrt(d2 + tiny)) * acceleration
+
+        geometry = grid.geometry
+        self.sum_fluid = make_neighbour_sum(geometry, grid.start, support, fluid_pair, dim, backend)
+        if walls is not None:
+            self.sum_walls = make_neighbour_sum(geometry, walls.start, support, wall_pair, dim, backend)
+
+    @ti.func
+    def acceleration(self, k):
+        """Acceleration [m/s^2], (dim,), of the particle at place `k`."""
+        x = self.near.x[k]
+        total = self.sum_fluid(k, x)
+        if ti.static(self.has_walls):
+            if self.walls.near[self.grid.block(self.grid.order[k])] == 1:
+                total += self.sum_walls(k, x)
+        for d in ti.static(range(self.grid.geometry.dim)):
+            total[d] += self.gravity[d]
+        return total

@@ -1,0 +1,155 @@
+"""Taichi kernels of the splatter: from points to nearest depth and nearest particle per pixel.
+
+They are module-level functions, so several splatters share one compilation. All numbers are cast to f32 where they
+meet literals, since a literal has the run's default precision, which may be f64. Buffers are flat: y * width + x.
+
+A lens is (pixels per metre at unit depth, 1 if perspective else 0, width / 2, height / 2).
+"""
+
+import taichi as ti
+
+vec3 = ti.types.vector(3, ti.f32)
+vec4 = ti.types.vector(4, ti.f32)
+Floats = ti.types.ndarray(dtype=ti.f32, ndim=1)
+Ints = ti.types.ndarray(dtype=ti.i32, ndim=1)
+Vectors3 = ti.types.ndarray(dtype=vec3, ndim=1)
+Vectors4 = ti.types.ndarray(dtype=vec4, ndim=1)
+Table = ti.types.ndarray(dtype=ti.f32, ndim=2)
+
+FAR = 0x7F000000  # bit pattern of a depth no particle has (1.7e38 m)
+NOBODY = 0x7FFFFFFF
+SAME_DEPTH = 2  # units in the last place: two kernels may round the same formula differently
+SMALLEST = 0.71  # [pixels] radius below which a sphere could fall between pixel centres and vanish
+
+
+@ti.kernel
+def upload_points(
+    positions: Table, colours: Table, linear: Floats, count: ti.i32, points: Vectors3, tints: Vectors3
+):
+    """Copy the frame's arrays to the device; colours go from sRGB to linear light by table."""
+    steps = linear.shape[0] - 1
+    for i in range(count):
+        for k in ti.static(range(3)):
+            points[i][k] = positions[i, k]
+            place = ti.round(colours[i, k] * ti.cast(steps, ti.f32), ti.i32)
+            tints[i][k] = linear[ti.min(ti.max(place, 0), steps)]
+
+
+@ti.func
+def metres_per_pixel(z, lens):
+    """Size of a pixel at depth z."""
+    return ti.select(lens[1] > 0, z, ti.f32(1.0)) / lens[0]
+
+
+@ti.kernel
+def project_points(
+    points: Vectors3,
+    count: ti.i32,
+    radius: ti.f32,
+    eye: vec3,
+    right: vec3,
+    up: vec3,
+    forward: vec3,
+    lens: vec4,
+    sprites: Vectors4,
+):
+    """Write pixel x, pixel y, depth and radius in pixels; radius 0 marks what is out of sight."""
+    for i in range(count):
+        offset = points[i] - eye
+        z = offset.dot(forward)
+        sprite = vec4(0, 0, 0, 0)
+        if z > radius:
+            scale = ti.f32(1.0) / metres_per_pixel(z, lens)
+            x = lens[2] + scale * offset.dot(right)
+            y = lens[3] - scale * offset.dot(up)
+            size = ti.max(radius * scale, ti.f32(SMALLEST))
+            if ti.abs(x - lens[2]) < lens[2] + size and ti.abs(y - lens[3]) < lens[3] + size:
+                sprite = vec4(x, y, z, size)
+        sprites[i] = sprite
+
+
+@ti.kernel
+def clear_buffer(buffer: Ints, value: ti.i32):
+    """Set every entry to one value."""
+    for p in range(buffer.shape[0]):
+        buffer[p] = value
+
+
+@ti.func
+def splat(sprite, number, lens, width, height, depth: ti.template(), nearest: ti.template(), naming: ti.template()):
+    """Visit the pixels of one sphere, row by row, and enter its depth, or its number where it is the nearest."""
+    half = ti.f32(0.5)
+    zero = ti.f32(0.0)
+    size = sprite[3]
+    unit = metres_per_pixel(sprite[2], lens)
+    top = ti.ceil(ti.max(sprite[1] - size - half, zero), ti.i32)
+    bottom = ti.floor(ti.min(sprite[1] + size + half, ti.cast(height, ti.f32)), ti.i32)
+    for y in range(top, bottom):
+        dy = ti.cast(y, ti.f32) + half - sprite[1]
+        chord = ti.max(size * size - dy * dy, zero)
+        reach = ti.sqrt(chord)
+        first = ti.ceil(ti.max(sprite[0] - reach - half, zero), ti.i32)
+        last = ti.floor(ti.min(sprite[0] + reach + half, ti.cast(width, ti.f32)), ti.i32)
+        for x in range(first, last):
+            dx = ti.cast(x, ti.f32) + half - sprite[0]
+            z = sprite[2] - unit * ti.sqrt(ti.max(chord - dx * dx, zero))
+            bits = ti.bit_cast(z, ti.i32)  # floats above zero order like integers
+            p = y * width + x
+            if ti.static(naming):
+                if bits <= depth[p] + SAME_DEPTH:
+                    ti.atomic_min(nearest[p], number)
+            else:
+                if bits < depth[p]:  # a plain read first spares most of the atomics
+                    ti.atomic_min(depth[p], bits)
+
+
+@ti.kernel
+def splat_depths(sprites: Vectors4, count: ti.i32, lens: vec4, width: ti.i32, height: ti.i32, depth: Ints):
+    """Enter the least depth of all spheres in every pixel."""
+    for i in range(count):
+        if sprites[i][3] > 0:
+            splat(sprites[i], i, lens, width, height, depth, depth, False)
+
+
+@ti.kernel
+def splat_numbers(
+    sprites: Vectors4, count: ti.i32, lens: vec4, width: ti.i32, height: ti.i32, depth: Ints, nearest: Ints
+):
+    """Enter the number of the nearest sphere in every pixel; of several at one depth, the lowest number."""
+    for i in range(count):
+        if sprites[i][3] > 0:
+            splat(sprites[i], i, lens, width, height, depth, nearest, True)
+
+
+@ti.kernel
+def trace_lines(
+    ends: Table,
+    steps: ti.i32,
+    half_width: ti.i32,
+    lens: vec4,
+    width: ti.i32,
+    height: ti.i32,
+    bias: ti.f32,
+    seen: ti.i32,
+    hidden: ti.i32,
+    depth: Ints,
+    lines: Ints,
+):
+    """Draw segments (x, y, z of both ends) as coverage 0 to 255: `seen` in front of all spheres, else `hidden`."""
+    for edge, step in ti.ndrange(ends.shape[0], steps + 1):
+        t = ti.cast(step, ti.f32) / ti.cast(steps, ti.f32)
+        s = ti.f32(1.0) - t
+        x = s * ends[edge, 0] + t * ends[edge, 3]
+        y = s * ends[edge, 1] + t * ends[edge, 4]
+        near = ends[edge, 2]
+        far = ends[edge, 5]
+        # along a straight line in the picture, 1/z is linear under perspective and z without it
+        z = ti.select(lens[1] > 0, near * far / ti.max(s * far + t * near, ti.f32(1e-30)), s * near + t * far)
+        if ti.abs(x - lens[2]) < lens[2] and ti.abs(y - lens[3]) < lens[3]:
+            limit = ti.bit_cast(ti.max(z - bias, ti.f32(0.0)), ti.i32)
+            column = ti.floor(x, ti.i32)
+            row = ti.floor(y, ti.i32)
+            for v in range(ti.max(row - half_width, 0), ti.min(row + half_width + 1, height)):
+                for u in range(ti.max(column - half_width, 0), ti.min(column + half_width + 1, width)):
+                    p = v * width + u
+                    ti.atomic_max(lines[p], ti.select(limit <= depth[p], seen, hidden))

@@ -1,0 +1,230 @@
+"""The default renderer: spheres splatted in software by Taichi kernels, on any arch, without a display.
+
+The nearest depth per pixel is an integer minimum and ties go to the lowest index, so that the same arrays give the
+same bits on one arch, whatever the threads did.
+"""
+
+import numpy as np
+import taichi as ti
+
+from taichi_rts.errors import RenderError
+from taichi_rts.rendering import shade_kernels, splat_kernels
+from taichi_rts.rendering.camera import Camera, box_corners, box_edges
+
+SHADOW_SIZE = 1024  # pixels of the shadow map, square
+LINE_COLOUR = (0.16, 0.17, 0.20)
+
+
+def srgb_to_linear(values) -> np.ndarray:
+    """Return linear light of sRGB values in 0 to 1 (IEC 61966-2-1)."""
+    values = np.asarray(values, float)
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def linear_to_srgb(values) -> np.ndarray:
+    """Return sRGB values of linear light in 0 to 1 (IEC 61966-2-1)."""
+    values = np.asarray(values, float)
+    return np.where(values <= 0.0031308, values * 12.92, 1.055 * values ** (1 / 2.4) - 0.055)
+
+
+def checked_arrays(positions, colours, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return (N, 3) float32 positions and colours without the rows that are not finite."""
+    positions = np.asarray(positions, np.float32)
+    colours = np.asarray(colours, np.float32)
+    if positions.ndim != 2 or positions.shape[1] not in (2, 3):
+        raise RenderError(f"positions have shape {positions.shape}, must be (N, 2) or (N, 3): pass one row a particle")
+    if colours.shape != (len(positions), 3):
+        raise RenderError(
+            f"colours have shape {colours.shape}, must be ({len(positions)}, 3): pass one RGB row for each position"
+        )
+    if not radius > 0:
+        raise RenderError(f"radius = {radius} m must be above 0: half the particle spacing is a good choice")
+    if positions.shape[1] == 2:
+        positions = np.pad(positions, ((0, 0), (0, 1)))
+    if not np.isfinite(positions).all():
+        kept = np.isfinite(positions).all(axis=1)
+        positions, colours = positions[kept], colours[kept]
+    return np.ascontiguousarray(positions), np.ascontiguousarray(colours)
+
+
+class Splatter:
+    """Draws particles as lit spheres into a NumPy image; call after `ti.init`."""
+
+    def __init__(
+        self, width: int = 1280, height: int = 720, supersample: int = 2, background=(1, 1, 1), shadows: bool = True
+    ):
+        """Allocate the picture's buffers; `background` is sRGB, `supersample` the samples per pixel and axis."""
+        if min(width, height) < 1 or not 1 <= supersample <= 8 or width * height * supersample**2 > 2**29:
+            raise RenderError(
+                f"picture of {width} x {height} pixels with supersample = {supersample} is not possible: sides must "
+                "be at least 1, supersample 1 to 8, and all samples at most 2^29: lower one of them"
+            )
+        self.width, self.height, self.supersample, self.shadows = width, height, supersample, shadows
+        self._background = srgb_to_linear(background)
+        self._fine = (width * supersample, height * supersample)
+        samples, pixels = self._fine[0] * self._fine[1], width * height
+        self._depth, self._nearest, self._lines = (ti.ndarray(ti.i32, samples) for _ in range(3))
+        self._shadow_depth = ti.ndarray(ti.i32, SHADOW_SIZE**2)
+        self._veil, self._smooth_veil = (ti.Vector.ndarray(3, ti.f32, pixels) for _ in range(2))
+        self._linear = ti.ndarray(ti.f32, 255 * 4 + 1)  # 8-bit colours fall on entries
+        self._linear.from_numpy(srgb_to_linear(np.linspace(0, 1, 255 * 4 + 1)))
+        self._encode = ti.ndarray(ti.i32, 4096)  # entry k is linear light (k / 4095)^2
+        self._encode.from_numpy(np.rint(255 * linear_to_srgb(np.linspace(0, 1, 4096) ** 2)).astype(np.int32))
+        self._capacity = 0
+        self._reserve(1)
+
+    def _reserve(self, count: int) -> None:
+        """Make room for `count` particles; it doubles, so that a growing count allocates seldom."""
+        if count <= self._capacity:
+            return
+        self._capacity = max(count, 2 * self._capacity)
+        self._points, self._tints = (ti.Vector.ndarray(3, ti.f32, self._capacity) for _ in range(2))
+        self._sprites = ti.Vector.ndarray(4, ti.f32, self._capacity)
+
+    def draw(self, positions, colours, radius: float, camera: Camera, outline=None) -> np.ndarray:
+        """Return the picture, (height, width, 3) uint8.
+
+        `positions` (N, 2 or 3) [m] and `radius` [m] are in the scene's units, `colours` (N, 3) are sRGB in 0 to 1;
+        `outline` is (lower, upper) of a box to draw as a wireframe, whose floor then catches the shadows.
+        """
+        flat = np.ndim(positions) == 2 and np.shape(positions)[1] == 2
+        positions, colours = checked_arrays(positions, colours, radius)
+        count = len(positions)
+        self._reserve(count)
+        if count:
+            splat_kernels.upload_points(positions, colours, self._linear, count, self._points, self._tints)
+        basis = np.array(camera.basis())
+        eye = np.asarray(camera.eye, float)
+        width, height = self._fine
+        perspective = camera.orthographic_height is None
+        lens = (camera.focal_pixels(height), float(perspective), width / 2, height / 2)
+        box = _bounds(positions, outline)
+        light = _light_direction(camera, basis)
+        light_basis, light_eye, light_lens = _light_view(light, box, radius)
+
+        clear = splat_kernels.clear_buffer
+        clear(self._shadow_depth, splat_kernels.FAR)
+        clear(self._depth, splat_kernels.FAR)
+        clear(self._nearest, splat_kernels.NOBODY)
+        clear(self._lines, 0)
+        if self.shadows and not flat and count:
+            self._project(count, radius, light_eye, light_basis, light_lens)
+            splat_kernels.splat_depths(
+                self._sprites, count, light_lens, SHADOW_SIZE, SHADOW_SIZE, self._shadow_depth
+            )
+        if count:
+            self._project(count, radius, eye, basis, lens)
+            splat_kernels.splat_depths(self._sprites, count, lens, width, height, self._depth)
+            splat_kernels.splat_numbers(
+                self._sprites, count, lens, width, height, self._depth, self._nearest
+            )
+        if outline is not None:
+            self._trace(outline, camera, lens, radius)
+        extent = float(np.linalg.norm(box[1] - box[0]))
+        ground, ground_reach = _ground(camera, basis, box, extent, self.shadows and outline is not None and not flat)
+        reach = max(5 * radius, 0.03 * extent)
+        texel = 1.0 / light_lens[0]
+        softness = max(0.012 * extent / texel, 1.5)
+        shade_kernels.measure_veil(
+            self._depth,
+            self._shadow_depth,
+            lens,
+            ground,
+            ground_reach,
+            *(basis @ (light_eye - eye), *(light_basis @ basis.T)),
+            light_lens,
+            SHADOW_SIZE,
+            softness,
+            3 * radius + (softness + 1) * texel,
+            reach,
+            width,
+            height,
+            self.supersample,
+            self._veil,
+        )
+        shade_kernels.smooth_veil(self._veil, max(4 * radius, 0.01 * extent), self.width, self.height, self._smooth_veil)
+        picture = np.empty(self.width * self.height, np.int32)
+        shade_kernels.shade_picture(
+            self._sprites,
+            self._tints,
+            self._depth,
+            self._nearest,
+            self._lines,
+            self._smooth_veil,
+            self._encode,
+            lens,
+            basis @ light,
+            basis @ (np.asarray(camera.up, float) / np.linalg.norm(camera.up)),
+            self._background,
+            0.5 if ground[3] > 0 else 0.0,
+            srgb_to_linear(LINE_COLOUR),
+            radius,
+            width,
+            height,
+            self.supersample,
+            picture,
+        )
+        return np.ascontiguousarray(picture.view(np.uint8).reshape(self.height, self.width, 4)[:, :, :3])
+
+    def _project(self, count: int, radius: float, eye, basis, lens) -> None:
+        splat_kernels.project_points(self._points, count, radius, eye, *basis, lens, self._sprites)
+
+    def _trace(self, outline, camera: Camera, lens, radius: float) -> None:
+        """Draw the wireframe of a box into the line buffer; its edges end at the camera's near plane."""
+        width, height = self._fine
+        corners = box_corners(*outline)
+        ends = camera.project(corners, width, height)
+        near = 1e-3 * float(np.max(np.abs(ends[:, 2])))
+        segments = []
+        for a, b in box_edges(len(outline[0])):
+            pair, depths = corners[[a, b]], ends[[a, b], 2]
+            if depths.max() <= near:
+                continue
+            if depths.min() < near:
+                cut = (near - depths[0]) / (depths[1] - depths[0])
+                pair[int(depths[1] < near)] = corners[a] + cut * (corners[b] - corners[a])
+            segments.append(camera.project(pair, width, height).ravel())
+        if not segments:
+            return
+        table = np.array(segments, np.float32)
+        longest = float(np.max(np.abs(table[:, :2] - table[:, 3:5])))
+        steps = int(min(longest + 2, 1e5))
+        half_width = max(round(0.5 * self.supersample * self.height / 720), 0)
+        splat_kernels.trace_lines(
+            table, steps, half_width, lens, width, height, 2 * radius, 200, 45, self._depth, self._lines
+        )
+
+
+def _bounds(positions: np.ndarray, outline) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners of what is drawn: the outline if there is one, which keeps light and shadow steady."""
+    if outline is not None:
+        corners = box_corners(*outline)
+        return corners.min(axis=0), corners.max(axis=0)
+    if len(positions) == 0:
+        return np.zeros(3), np.ones(3)
+    return positions.min(axis=0).astype(float), positions.max(axis=0).astype(float)
+
+
+def _light_direction(camera: Camera, basis: np.ndarray) -> np.ndarray:
+    """Return the unit vector to the light: high, over the viewer's left shoulder."""
+    upward = np.asarray(camera.up, float) / np.linalg.norm(camera.up)
+    light = 1.1 * upward - 0.55 * basis[0] - 0.6 * basis[2] + 0.3 * basis[1]
+    return light / np.linalg.norm(light)
+
+
+def _light_view(light: np.ndarray, box, radius: float):
+    """Return basis, origin and lens of the light's parallel view of the whole box."""
+    middle = 0.5 * (box[0] + box[1])
+    reach = 0.5 * float(np.linalg.norm(box[1] - box[0])) + 2 * radius
+    view = Camera(tuple(middle + light * (reach + 2 * radius)), tuple(middle), tuple(np.roll(light, 1)))
+    return np.array(view.basis()), np.array(view.eye), (SHADOW_SIZE / (2 * reach), 0.0, SHADOW_SIZE / 2, SHADOW_SIZE / 2)
+
+
+def _ground(camera: Camera, basis: np.ndarray, box, extent: float, wanted: bool):
+    """Return the plane under the box in view coordinates, and how deep it reaches; height 0 for none."""
+    upward = np.asarray(camera.up, float) / np.linalg.norm(camera.up)
+    corners = box_corners(*box)
+    level = float(np.min(corners @ upward))
+    above = float(np.dot(camera.eye, upward)) - level
+    reach = float(np.max(corners @ basis[2] - np.dot(camera.eye, basis[2]))) + extent
+    return (*(basis @ upward), above if wanted and above > 0 else 0.0), reach

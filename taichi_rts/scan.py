@@ -1,0 +1,59 @@
+"""Exclusive prefix sums in kernels. Taichi's own `PrefixSumExecutor` refuses the CPU and is wrong on lavapipe."""
+
+import math
+
+import taichi as ti
+
+
+@ti.data_oriented
+class ExclusiveScan:
+    """Turns counts into starts: `starts[k] = sum(counts[:k])`, `starts[n]` and `total[None]` the sum of all.
+
+    Two levels of about sqrt(n) entries: chunks in parallel, one thread over the chunks' sums, chunks in parallel.
+    """
+
+    def __init__(self, counts: ti.Field, starts: ti.Field) -> None:
+        self.n = counts.shape[0]
+        if starts.shape[0] != self.n + 1:
+            raise ValueError(f"starts has {starts.shape[0]} entries; counts has {self.n}, so it needs {self.n + 1}")
+        self.counts = counts
+        self.starts = starts
+        self.chunk = max(32, math.isqrt(self.n) + 1)
+        self.chunks = -(-self.n // self.chunk)
+        self.sums = ti.field(ti.i32, self.chunks)
+        self.total = ti.field(ti.i32, ())
+
+    def run(self) -> None:
+        """Fill `starts` and `total` from `counts`."""
+        self.sum_chunks()
+        self.scan_sums()
+        self.scan_chunks()
+
+    @ti.kernel
+    def sum_chunks(self):
+        for c in range(self.chunks):
+            total = 0
+            for k in range(c * self.chunk, ti.min((c + 1) * self.chunk, self.n)):
+                total += self.counts[k]
+            self.sums[c] = total
+
+    @ti.kernel
+    def scan_sums(self):
+        ti.loop_config(serialize=True)
+        for _ in range(1):
+            running = 0
+            for c in range(self.chunks):
+                count = self.sums[c]
+                self.sums[c] = running
+                running += count
+            self.total[None] = running
+            self.starts[self.n] = running
+
+    @ti.kernel
+    def scan_chunks(self):
+        for c in range(self.chunks):
+            running = self.sums[c]
+            for k in range(c * self.chunk, ti.min((c + 1) * self.chunk, self.n)):
+                count = self.counts[k]
+                self.starts[k] = running
+                running += count

@@ -1,0 +1,189 @@
+"""Read this first: one run, wired from its parts. `Simulation.step` is Algorithm 1 of Goswami & Batty 2014."""
+
+from __future__ import annotations
+
+import time as clock
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+from taichi_rts import backend as backends
+from taichi_rts.diagnostics import Energy, Tally, measure_energy
+from taichi_rts.errors import SimulationDivergedError, TimeError
+from taichi_rts.grid import BlockGrid, Geometry
+from taichi_rts.motion import Motion
+from taichi_rts.particles import Neighbourhood, Particles
+from taichi_rts.physics.density import SummationDensity
+from taichi_rts.physics.medium import Medium
+from taichi_rts.physics.momentum import MomentumEquation, Pressure
+from taichi_rts.physics.viscosity import viscosity_terms
+from taichi_rts.physics.walls import Walls
+from taichi_rts.sampling import sample
+from taichi_rts.scene import Scene
+from taichi_rts.stepping.base import Stepper
+from taichi_rts.stepping.regional import Regional
+
+REORDER_EVERY = 32  # steps between moving the state itself into the grid's order, for locality only
+COUNTER_LIMIT = 2**30  # counts on the device are 32-bit; they are collected before they can overflow
+
+
+class Simulation:
+    """A scene, a stepper, and the state in between.
+
+    Call `taichi_rts.init` first. Building one compiles its kernels and evaluates the first forces.
+    """
+
+    def __init__(self, scene: Scene, stepper: Stepper | None = None) -> None:
+        backend = backends.current()
+        self.scene = scene
+        self.stepper: Stepper = stepper if stepper is not None else Regional()
+        self.backend = backend
+        start = sample(scene)
+        self.medium = Medium.of(scene, start.mass)
+        self.timeline = self.stepper.timeline(scene)
+
+        self.particles = Particles(
+            start.positions,
+            start.velocities,
+            scene.rest_density,
+            backend,
+            with_rho_rate=self.stepper.extrapolates_density,
+        )
+        geometry = Geometry(scene.domain.lower, scene.domain.upper, scene.support)
+        self.grid = BlockGrid(geometry, self.particles.count)
+        self.near = Neighbourhood(self.particles.count, scene.dim, backend)
+        self.walls = Walls(start.wall_positions, start.wall_volumes, geometry, backend) if scene.walls else None
+        self.density = SummationDensity(self.particles, self.near, self.grid, self.walls, self.medium, backend)
+        terms = [Pressure(self.near, scene.rest_density), *viscosity_terms(scene, self.medium, self.near)]
+        momentum = MomentumEquation(
+            terms, self.near, self.grid, self.walls, self.medium, scene.acceleration, backend
+        )
+        self.motion = Motion(
+            self.particles,
+            self.near,
+            self.grid,
+            momentum,
+            self.stepper.make_integrator(),
+            self.medium.equation_of_state,
+        )
+        self.schedule = self.stepper.schedule(scene, self.particles, self.grid, self.timeline)
+
+        self._tally = Tally(self.particles.count, self.schedule.levels)
+        self._uncollected = 0
+        self._time = 0.0
+        began = clock.perf_counter()
+        self.step()  # lines 1-2: validity 0, so everybody is due at tick 0, where the first forces are evaluated
+        self.schedule.take_counts()
+        ti.sync()
+        self.setup_seconds = clock.perf_counter() - began
+
+    def step(self) -> None:
+        """Do what is due at the present tick: lines 4-29 of Algorithm 1."""
+        now, tick = self.timeline.now, self.timeline.tick
+        schedule = self.schedule
+        self.grid.update(self.motion.locate_particles, self.particles.identity, now, tick)  # line 4
+        schedule.select(now, tick)  # lines 5-16
+        self.motion.predict_neighbourhood(schedule.touched, now, tick)  # lines 25-26, where somebody looks
+        self.density.update(schedule.due, schedule.due_count)  # lines 18-21
+        self.motion.advance_due(schedule.due, schedule.due_count, now, tick)  # lines 22-29
+        schedule.observe()
+
+    def advance_to(self, time: float) -> None:
+        """Run all steps up to physical `time` [s]; readers then predict to exactly that time.
+
+        The sequence of steps does not depend on the times asked for. Raises `TimeError` for a time in the past and
+        `SimulationDivergedError` when the state is no longer finite.
+        """
+        if time < self._time:
+            raise TimeError(f"time {time:g} s lies before the present {self._time:g} s; runs only go forward")
+        target = self.timeline.ticks_until(time)
+        ti.sync()
+        began = clock.perf_counter()
+        while self.timeline.now + (ticks := self.schedule.next_ticks()) <= target:
+            self.timeline.now += ticks
+            self.step()
+            self._count_step()
+        ti.sync()
+        self._tally.wall_seconds += clock.perf_counter() - began
+        self._collect_counts()
+        self._time = float(time)
+        self._check_finite()
+
+    def _count_step(self) -> None:
+        self._uncollected += 1
+        if self._uncollected % REORDER_EVERY == 0:
+            self.particles.reorder(self.grid.order)
+        if (self._uncollected + 1) * self.particles.count > COUNTER_LIMIT:
+            self._collect_counts()
+
+    def _collect_counts(self) -> None:
+        if self._uncollected:
+            self._tally.add(self._uncollected, *self.schedule.take_counts())
+            self._uncollected = 0
+
+    def _check_finite(self) -> None:
+        broken = int(self.motion.not_finite[None])
+        if broken:
+            raise SimulationDivergedError(
+                f"{broken} particle states are no longer finite at t = {self._time:g} s; "
+                f"use a smaller courant (now {self.stepper}) or a larger sound_speed (now {self.medium.sound_speed:g} m/s)"
+            )
+
+    @property
+    def time(self) -> float:
+        """Physical time [s], exactly as last asked for."""
+        return self._time
+
+    @property
+    def count(self) -> int:
+        """Number of fluid particles N."""
+        return self.particles.count
+
+    @property
+    def base_step(self) -> float:
+        """The base step dt_b [s]; levels step at whole multiples of it."""
+        return self.timeline.tick * self.schedule.base_ticks
+
+    def state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Positions [m] and velocities [m/s], (N, dim), densities [kg/m^3] and levels, (N,), at `time`, by particle id."""
+        dtype, shape = self.backend.numpy_dtype, (self.count, self.scene.dim)
+        x, v = np.empty(shape, dtype), np.empty(shape, dtype)
+        rho, level = np.empty(self.count, dtype), np.empty(self.count, np.int32)
+        now, tick = self.timeline.now, self.timeline.tick
+        self.motion.export(now, tick, self._time - self.timeline.time, x, v, rho, level)
+        return x, v, rho, level
+
+    def positions(self) -> np.ndarray:
+        """Positions [m], (N, dim), predicted to `time`, in order of particle id."""
+        return self.state()[0]
+
+    def velocities(self) -> np.ndarray:
+        """Velocities [m/s], (N, dim), predicted to `time`, in order of particle id."""
+        return self.state()[1]
+
+    def densities(self) -> np.ndarray:
+        """Densities [kg/m^3], (N,), of each particle's last evaluation, in order of particle id."""
+        return self.state()[2]
+
+    def pressures(self) -> np.ndarray:
+        """Pressures [Pa], (N,), of each particle's last evaluation, in order of particle id."""
+        return self.medium.equation_of_state.pressure_numpy(self.densities())
+
+    def levels(self) -> np.ndarray:
+        """Levels n, (N,): each particle's step is n base steps. In order of particle id."""
+        return self.state()[3]
+
+    @property
+    def statistics(self) -> dict[str, Any]:
+        """Work so far: base_steps, particle_updates, wall_seconds, active_fraction, level_fractions and more."""
+        return {**self._tally.statistics(), "stopped_by_domain": int(self.motion.stopped[None])}
+
+    def energy(self) -> Energy:
+        """Kinetic, potential and internal energy [J] at `time`."""
+        x, v, rho, _ = self.state()
+        return measure_energy(self.scene, self.medium, x, v, rho)
+
+    def momentum(self) -> np.ndarray:
+        """Total momentum [kg m/s], (dim,), at `time`."""
+        return self.medium.mass * self.velocities().astype(np.float64).sum(axis=0)

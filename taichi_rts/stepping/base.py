@@ -1,0 +1,73 @@
+"""What a stepper is: a frozen description that users write, and a schedule that says who is due."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Protocol
+
+import taichi as ti
+from pydantic import Field
+
+from taichi_rts.grid import BlockGrid
+from taichi_rts.particles import Particles
+from taichi_rts.scene import Scene
+from taichi_rts.stepping.timeline import Timeline
+
+Courant = Annotated[float, Field(gt=0, le=2)]
+
+
+class Stepper(Protocol):
+    """A stepper's parameters, and how they become a schedule for one run. To add one, write one file like `uniform.py`."""
+
+    name: str
+
+    @property
+    def extrapolates_density(self) -> bool:
+        """Whether the densities of particles that are not due follow d rho/dt, which then has to be computed."""
+
+    def make_integrator(self) -> Any:
+        """Return the integrator, an object as in `taichi_rts.integrators`."""
+
+    def timeline(self, scene: Scene) -> Timeline:
+        """Return the clock for `scene`: its tick divides the base step."""
+
+    def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
+        """Build the fields and kernels that decide who is due."""
+
+
+@ti.data_oriented
+class Schedule:
+    """Who is due in the present step.
+
+    Attributes:
+        due: places (in the grid's order) of the due particles, ascending; `due_count` of them.
+        touched: 1 for each block whose particles a due particle may read.
+        base_ticks: ticks in one base step.
+        levels: number of levels; level n steps every n base steps.
+    """
+
+    levels = 1
+    base_ticks = 1
+
+    def __init__(self, particles: Particles, grid: BlockGrid) -> None:
+        self.particles = particles
+        self.grid = grid
+        self.due = ti.field(ti.i32, particles.count)
+        self.due_count = ti.field(ti.i32, ())
+        self.touched = ti.field(ti.i32, grid.geometry.blocks)
+
+    def next_ticks(self) -> int:
+        """Length of the next step in ticks; it depends on the state only."""
+        return 1
+
+    def select(self, now: int, tick: float) -> None:
+        """Decide who is due at tick `now` (Algorithm 1, lines 5-16)."""
+
+    def observe(self) -> None:
+        """Look at the state after a step, to choose the next."""
+
+    def take_counts(self) -> tuple[list[int], list[int]]:
+        """Return particles and updates per level, each summed over the steps since the last call, and forget them.
+
+        Empty lists stand for "every particle, every step, level 1".
+        """
+        return [], []

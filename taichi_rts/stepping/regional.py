@@ -1,0 +1,204 @@
+"""Regional time stepping (Goswami & Batty 2014): every block of side r steps at n base steps."""
+
+from typing import Annotated, Any, ClassVar, Literal
+
+import taichi as ti
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from taichi_rts.errors import StepperError
+from taichi_rts.grid import BlockGrid
+from taichi_rts.integrators.serna import Serna
+from taichi_rts.particles import Particles
+from taichi_rts.scan import ExclusiveScan
+from taichi_rts.scene import Positive, Scene
+from taichi_rts.stepping import criteria
+from taichi_rts.stepping.base import Courant, Schedule
+from taichi_rts.stepping.limiter import BlockLimiter
+from taichi_rts.stepping.timeline import Timeline
+from taichi_rts.validation import FROZEN, validated
+
+PRESETS: dict[str | None, dict[str, Any]] = {
+    None: {"courant": 0.4, "levels": 2, "strict_cfl": False},
+    "paper": {"courant": 0.4, "levels": 3, "strict_cfl": False},
+}
+
+
+@validated(StepperError)
+@dataclass(frozen=True, config=FROZEN)
+class Regional:
+    """Blocks get steps of n base steps; only due particles recompute density and forces.
+
+    Attributes:
+        courant: lambda_v of Eq. 1; with `strict_cfl` off it sets the base step, with it on the longest step.
+        levels: n_max, the largest n.
+        corrector: apply Serna's correction (Eq. 6-7); without it the method blows up (the paper's Figure 2).
+        strict_cfl: divide the base step by n_max, so that the longest step too respects Eq. 1.
+        preset: "paper" for the paper's constants; explicit arguments win.
+        alpha, beta, beta_decay: Eq. 3, with beta_n = beta * beta_decay^(n-2).
+        lambda_f: Eq. 2.
+        grading: let the levels of neighbouring blocks differ by at most one (R_min alone leaves jumps from 1 to 3).
+        inactive_density: what due particles read of others: "stale" (of the last evaluation) or "extrapolated".
+    """
+
+    courant: Courant | None = None
+    levels: Annotated[int, Field(ge=1, le=16)] | None = None
+    corrector: bool = True
+    strict_cfl: bool | None = None
+    preset: Literal["paper"] | None = None
+    alpha: Positive = 0.4
+    beta: Positive = 0.4
+    beta_decay: Annotated[float, Field(gt=0, le=1)] = 0.2
+    lambda_f: Positive = 0.25
+    grading: bool = False
+    inactive_density: Literal["stale", "extrapolated"] = "stale"
+
+    name: ClassVar[str] = "regional"
+
+    def resolved(self, key: str) -> Any:
+        """Return parameter `key`: as given, else from the preset."""
+        value = getattr(self, key)
+        return PRESETS[self.preset][key] if value is None else value
+
+    @property
+    def extrapolates_density(self) -> bool:
+        """Whether d rho/dt is needed."""
+        return self.inactive_density == "extrapolated" and self.resolved("levels") > 1
+
+    def make_integrator(self) -> Any:
+        """Return the integrator's object."""
+        return Serna(self.corrector)
+
+    def timeline(self, scene: Scene) -> Timeline:
+        """Return a clock that ticks once a base step: lambda_v r/c_s, divided by n_max if strict."""
+        step = criteria.acoustic_step(self.resolved("courant"), scene.support, scene.wave_speed)
+        divisor = self.resolved("levels") if self.resolved("strict_cfl") else 1
+        viscous = criteria.viscous_step(scene.support, scene.kinematic_viscosity) / self.resolved("levels")
+        return Timeline(min(step / divisor, viscous))
+
+    def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
+        """Build the schedule of Algorithm 1."""
+        return RegionalSchedule(self, scene, particles, grid)
+
+
+@ti.data_oriented
+class RegionalSchedule(Schedule):
+    """Region determination and compute flags: lines 5-16 of Algorithm 1.
+
+    `block_level` is the region of each block (`BlockLimiter.EMPTY` where there is no particle).
+    """
+
+    def __init__(self, stepper: Regional, scene: Scene, particles: Particles, grid: BlockGrid) -> None:
+        super().__init__(particles, grid)
+        self.levels = stepper.resolved("levels")
+        self.lambda_f = stepper.lambda_f
+        self.support = scene.support
+        self.fractions = [
+            criteria.velocity_fraction(n, stepper.alpha, stepper.beta, stepper.beta_decay)
+            for n in range(2, self.levels + 1)
+        ]
+        blocks = grid.geometry.blocks
+        self.blocks = blocks
+        self.raw_level = ti.field(ti.i32, blocks)
+        self.block_level = ti.field(ti.i32, blocks)
+        self.limiter = BlockLimiter(grid.geometry)
+        self.grading_sweeps = max(0, self.levels - 2) if stepper.grading else 0
+        self.flag = ti.field(ti.i32, particles.count)
+        self.block_due = ti.field(ti.i32, blocks)
+        self.due_start = ti.field(ti.i32, blocks + 1)
+        self.scan = ExclusiveScan(self.block_due, self.due_start)
+        self.due_count = self.scan.total
+        self.occupancy = [ti.field(ti.i32, ()) for _ in range(self.levels)]
+        self.updates = [ti.field(ti.i32, ()) for _ in range(self.levels)]
+
+    def select(self, now: int, tick: float) -> None:
+        """Algorithm 1, lines 5-16, and the list of due particles."""
+        self.determine_regions(now, tick)
+        self.apply_minimum_region()
+        self.update_validity(now)
+        self.scan.run()
+        self.compact_due()
+        self.mark_touched()
+
+    @ti.kernel
+    def determine_regions(self, now: ti.i32, tick: float):
+        """Lines 6-9: maxima of |v| and F/m over each block, and the largest n that Eq. 2 and 3 allow."""
+        for block in range(self.blocks):
+            first, end = self.grid.first(block), self.grid.first(block + 1)
+            speed2, acceleration2 = 0.0, 0.0
+            for k in range(first, end):
+                i = self.grid.order[k]
+                a = self.particles.a[i]
+                v = self.particles.v[i] + a * (ti.cast(now - self.particles.updated[i], float) * tick)
+                speed2 = ti.max(speed2, v.norm_sqr())
+                acceleration2 = ti.max(acceleration2, a.norm_sqr())
+            self.raw_level[block] = self.region(tick, speed2, acceleration2) if first < end else BlockLimiter.EMPTY
+
+    @ti.func
+    def region(self, base_step, speed2, acceleration2):
+        """Section 2: the largest n whose step satisfies Eq. 2 and Eq. 3 (Eq. 1 is the same for every block)."""
+        level = 1
+        for n in ti.static(range(2, self.levels + 1)):
+            step = base_step * n
+            if criteria.allows_force(step, self.lambda_f, self.support, acceleration2):
+                if criteria.allows_velocity(step, ti.static(self.fractions[n - 2]), self.support, speed2):
+                    level = n
+        return level
+
+    def apply_minimum_region(self) -> None:
+        """R_min of Section 3, then the sweeps of grading."""
+        self.limiter.limit(self.raw_level, self.block_level, 0)
+        for _ in range(self.grading_sweeps):
+            self.limiter.limit(self.block_level, self.raw_level, 1)
+            self.limiter.limit(self.raw_level, self.block_level, 1)
+
+    @ti.kernel
+    def update_validity(self, now: ti.i32):
+        """Lines 10-16: due are particles whose validity has run out or whose block has another step; they take its step."""
+        for block in range(self.blocks):
+            first, end = self.grid.first(block), self.grid.first(block + 1)
+            level = self.block_level[block]
+            count = 0
+            for k in range(first, end):
+                i = self.grid.order[k]
+                validity = self.particles.level[i] - (now - self.particles.updated[i])
+                flag = 0
+                if validity <= 0 or self.particles.level[i] != level:
+                    flag = 1
+                    self.particles.level[i] = level
+                self.flag[k] = flag
+                count += flag
+            self.block_due[block] = count
+            for n in ti.static(range(self.levels)):
+                here = ti.cast(level == n + 1, ti.i32)
+                self.occupancy[n][None] += here * (end - first)
+                self.updates[n][None] += here * count
+
+    @ti.kernel
+    def compact_due(self):
+        """List the places of due particles in the grid's order, so that memory access stays contiguous."""
+        for block in range(self.blocks):
+            if self.block_due[block] > 0:
+                n = self.due_start[block]
+                for k in range(self.grid.first(block), self.grid.first(block + 1)):
+                    if self.flag[k] == 1:
+                        self.due[n] = k
+                        n += 1
+
+    @ti.kernel
+    def mark_touched(self):
+        """Flag the blocks that hold a due particle or lie beside one that does; the others are left alone."""
+        for block in range(self.blocks):
+            touched = 0
+            if self.block_level[block] != BlockLimiter.EMPTY:
+                touched = ti.min(self.block_due[block], 1)
+                for stride in ti.static(self.grid.geometry.neighbour_strides):
+                    touched = ti.max(touched, ti.min(self.block_due[block + stride], 1))
+            self.touched[block] = touched
+
+    def take_counts(self) -> tuple[list[int], list[int]]:
+        """Return particles and updates per level since the last call."""
+        counts = ([int(f[None]) for f in self.occupancy], [int(f[None]) for f in self.updates])
+        for field in (*self.occupancy, *self.updates):
+            field[None] = 0
+        return counts

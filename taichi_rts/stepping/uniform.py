@@ -1,0 +1,115 @@
+"""One step for all: the baseline."""
+
+import math
+from typing import Any, ClassVar, Literal
+
+import taichi as ti
+from pydantic.dataclasses import dataclass
+
+from taichi_rts.errors import StepperError
+from taichi_rts.grid import BlockGrid
+from taichi_rts.integrators.serna import Serna
+from taichi_rts.integrators.symplectic_euler import SymplecticEuler
+from taichi_rts.particles import Particles
+from taichi_rts.scene import Positive, Scene
+from taichi_rts.stepping import criteria
+from taichi_rts.stepping.base import Courant, Schedule
+from taichi_rts.stepping.timeline import Timeline
+from taichi_rts.validation import FROZEN, validated
+
+INTEGRATORS = {kind.name: kind for kind in (Serna, SymplecticEuler)}
+SUBDIVISIONS = 64  # an adaptive step is a whole number of 64ths of the largest
+
+
+@validated(StepperError)
+@dataclass(frozen=True, config=FROZEN)
+class Uniform:
+    """All particles share one step.
+
+    Attributes:
+        courant: lambda = dt c_s / r.
+        integrator: "serna" (predictor-corrector, second order) or "symplectic_euler".
+        adaptive: shorten each step to what c_s + |v| and the largest acceleration allow, over all particles.
+        lambda_f: factor of the force limit (Eq. 2), used if adaptive.
+    """
+
+    courant: Courant = 0.4
+    integrator: Literal["serna", "symplectic_euler"] = "serna"
+    adaptive: bool = False
+    lambda_f: Positive = 0.25
+
+    name: ClassVar[str] = "uniform"
+    extrapolates_density: ClassVar[bool] = False
+
+    def make_integrator(self) -> Any:
+        """Return the integrator's object."""
+        return INTEGRATORS[self.integrator]()
+
+    def timeline(self, scene: Scene) -> Timeline:
+        """Return a clock that ticks once a step, or 64 times the largest step if adaptive."""
+        step = min(
+            criteria.acoustic_step(self.courant, scene.support, scene.wave_speed),
+            criteria.viscous_step(scene.support, scene.kinematic_viscosity),
+        )
+        return Timeline(step / SUBDIVISIONS if self.adaptive else step)
+
+    def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
+        """Build the schedule under which everybody is always due."""
+        if self.adaptive:
+            return AdaptiveSchedule(self, scene, particles, grid, timeline)
+        return UniformSchedule(particles, grid)
+
+
+@ti.data_oriented
+class UniformSchedule(Schedule):
+    """Everybody, every step."""
+
+    def __init__(self, particles: Particles, grid: BlockGrid) -> None:
+        super().__init__(particles, grid)
+        particles.level.fill(1)
+        self.touched.fill(1)
+        self.due_count[None] = particles.count
+        self.mark_all()
+
+    @ti.kernel
+    def mark_all(self):
+        for k in self.due:
+            self.due[k] = k
+
+
+@ti.data_oriented
+class AdaptiveSchedule(UniformSchedule):
+    """Everybody, every step; the step follows the largest speed and acceleration. Costs one small read a step."""
+
+    def __init__(
+        self, stepper: Uniform, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline
+    ) -> None:
+        super().__init__(particles, grid)
+        self.stepper = stepper
+        self.scene = scene
+        self.tick = timeline.tick
+        self.base_ticks = SUBDIVISIONS
+        self.speed2 = ti.field(float, ())
+        self.acceleration2 = ti.field(float, ())
+
+    @ti.kernel
+    def reduce_maxima(self):
+        self.speed2[None] = 0.0
+        self.acceleration2[None] = 0.0
+        for i in range(self.particles.count):
+            ti.atomic_max(self.speed2[None], self.particles.v[i].norm_sqr())
+            ti.atomic_max(self.acceleration2[None], self.particles.a[i].norm_sqr())
+
+    def observe(self) -> None:
+        """Reduce the maxima that the next step depends on."""
+        self.reduce_maxima()
+
+    def next_ticks(self) -> int:
+        """Ticks of the next step: the smallest of Eq. 1 with c_s + |v|, Eq. 2 and the fixed step."""
+        speed, acceleration = math.sqrt(self.speed2[None]), math.sqrt(self.acceleration2[None])
+        support = self.scene.support
+        step = min(
+            criteria.advective_step(self.stepper.courant, support, self.scene.wave_speed, speed),
+            criteria.force_step(self.stepper.lambda_f, support, acceleration),
+        )
+        return max(1, min(self.base_ticks, math.floor(step / self.tick))) if math.isfinite(step) else 1
