@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from taichi_rts.scene import Block, Scene
 from taichi_rts.smoothing import lattice_sum, make_kernel
+
+WALL_STIFFNESS = 4.0 / 3.0
+"""How much steeper a wall's density profile is than the lattice's it replaces (see `calibrate_walls`).
+
+1 continues the lattice: a pool 10 particles deep settles 3.3 % too low, and 2,300 centres hit the face of the domain in a
+double dam break. 2 balances a particle at rest on the wall exactly, but is so stiff that the same dam break blows up at
+courant 0.4. 4/3 settles 1.1 % too low, keeps every centre off the face, and survives courant 0.6.
+"""
 
 
 @dataclass(frozen=True)
@@ -64,31 +73,62 @@ def fill_block(scene: Scene, block: Block) -> np.ndarray:
 
 
 def line_walls(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Positions [m], (M, dim), and volumes [m^dim], (M,), of wall particles outside each face of the domain.
+    """Positions [m], (M, dim), and volumes [m^dim], (M,), of one layer of wall particles behind each face of the domain.
 
-    As many layers as the support radius can see continue the fluid's lattice, so that fluid resting on a wall has its
-    rest density; along a face the spacing is adapted so that a whole number fits.
+    Depth and volume come from `calibrate_walls`; along a face the spacing is adapted so that a whole number fits.
     """
     if not scene.walls:
         return np.zeros((0, scene.dim)), np.zeros(0)
     s = scene.spacing
-    layers = math.ceil(scene.support_ratio - 0.5 - 1e-9)
-    outside = (np.arange(layers) + 0.5) * s
-    inner, inner_width, full, full_width = [], [], [], []
+    depth, volume = calibrate_walls(scene)
+    inner, stretch = [], []
     for low, high in zip(scene.domain.lower, scene.domain.upper, strict=True):
         count = max(1, round((high - low) / s))
         width = (high - low) / count
         inner.append(low + (np.arange(count) + 0.5) * width)
-        inner_width.append(np.full(count, width))
-        full.append(np.concatenate([low - outside[::-1], inner[-1], high + outside]))
-        full_width.append(np.concatenate([np.full(layers, s), inner_width[-1], np.full(layers, s)]))
+        stretch.append(width / s)
     positions, volumes = [], []
     for axis in range(scene.dim):  # the two faces across `axis`; earlier axes' faces own the edges they share
-        ends = np.r_[0:layers, -layers:0]
-        rest = slice(axis + 1, None)
-        positions.append(_product([*inner[:axis], full[axis][ends], *full[rest]]))
-        volumes.append(_product([*inner_width[:axis], full_width[axis][ends], *full_width[rest]]).prod(axis=1))
+        faces = np.array([scene.domain.lower[axis] - depth, scene.domain.upper[axis] + depth])
+        beyond = [
+            np.concatenate([[scene.domain.lower[d] - depth], inner[d], [scene.domain.upper[d] + depth]])
+            for d in range(axis + 1, scene.dim)
+        ]
+        positions.append(_product([*inner[:axis], faces, *beyond]))
+        share = math.prod(stretch[d] for d in range(scene.dim) if d != axis)
+        volumes.append(np.full(len(positions[-1]), volume * share))
     return np.concatenate(positions), np.concatenate(volumes)
+
+
+def calibrate_walls(scene: Scene) -> tuple[float, float]:
+    """Depth [m] of the wall layer behind a face and volume V_b [m^dim] of its particles, for a lattice resting on the face.
+
+    Its nearest layer, half a spacing from the face, must have its rest density, so the wall replaces what the missing half
+    of the lattice would add: V S(d) = s^dim D. S(d) is the sum of W over the wall's plane at distance d, D the sum over the
+    missing layers. And the wall should carry it: it pushes with p_i alone where the missing half would push with p_i and
+    p_j, so its slope has to be steeper: S'(d)/S(d) = WALL_STIFFNESS D'/D. The two give d, then V.
+    """
+    s, dim, r = scene.spacing, scene.dim, scene.support
+    kernel = make_kernel(scene.kernel, dim, r)
+    reach = math.ceil(scene.support_ratio)
+    lateral2 = sum(g**2 for g in np.meshgrid(*[s * np.arange(-reach, reach + 1)] * (dim - 1)))
+
+    def plane(d: float) -> float:
+        return float(kernel.sample(np.sqrt(lateral2 + d * d)).sum())
+
+    def slope(function: Callable[[float], float], d: float) -> float:
+        step = 1e-4 * s
+        return (function(d + step) - function(d - step)) / (2 * step)
+
+    def missing(d: float) -> float:
+        return sum(plane(d + k * s) for k in range(reach))
+
+    wanted = WALL_STIFFNESS * slope(missing, s) / missing(s)
+    near, far = s, 0.95 * r
+    for _ in range(60):
+        middle = 0.5 * (near + far)
+        near, far = (middle, far) if slope(plane, middle) / plane(middle) > wanted else (near, middle)
+    return near - 0.5 * s, s**dim * missing(s) / plane(near)
 
 
 def _product(axes: list[np.ndarray]) -> np.ndarray:

@@ -55,7 +55,7 @@ class Simulation:
         self.near = Neighbourhood(self.particles.count, scene.dim, backend)
         self.walls = Walls(start.wall_positions, start.wall_volumes, geometry, backend) if scene.walls else None
         self.density = SummationDensity(self.particles, self.near, self.grid, self.walls, self.medium, backend)
-        terms = [Pressure(self.near, scene.rest_density), *viscosity_terms(scene, self.medium, self.near)]
+        terms = [Pressure(self.near), *viscosity_terms(scene, self.medium, self.near)]
         momentum = MomentumEquation(
             terms, self.near, self.grid, self.walls, self.medium, scene.acceleration, backend
         )

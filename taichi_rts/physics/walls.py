@@ -1,11 +1,11 @@
-"""Wall boundary particles after Akinci et al. 2012, with mirrored pressure (Koschier et al. 2019, Sec. 5).
+"""Wall boundary particles after Akinci et al. 2012.
 
 Why this one and not Adami et al. 2012: its wall particles carry a volume and no state. Nothing has to be extrapolated to
-them, so a wall is valid at every time: just what particles that all live at different times need.
+them, so a wall is valid at every time: just what particles that all live at different times need. And its pressure force
+derives from the same energy as the fluid's, so a wall at rest does no work.
 
-Akinci's volume V_b = 1 / sum_k W_bk corrects for a single, uneven layer. The faces of the domain are lined evenly and as
-deep as the support radius sees, so here V_b is the volume of the wall's own lattice cell; the initial lattice continues
-into the wall and starts at its rest density.
+Akinci's V_b = 1 / sum_k W_bk makes up for what a single layer lacks, seen from the wall. For the even faces of the domain
+`sampling.calibrate_walls` works it out as seen from fluid at rest on them.
 """
 
 import numpy as np

@@ -33,8 +33,8 @@ def box_edges(dim: int) -> np.ndarray:
 class Camera:
     """A camera at `eye` [m] that looks at `target` [m].
 
-    `field_of_view` is the vertical angle [degrees]; with `orthographic_height` [m] the projection is parallel and
-    the picture is that high.
+    `field_of_view` is the vertical angle [degrees]; with `orthographic_height` [m] the projection is
+    parallel and the picture is that high.
     """
 
     eye: tuple
@@ -64,33 +64,37 @@ class Camera:
         lower,
         upper,
         azimuth: float = 28.0,
-        elevation: float = 16.0,
+        elevation: float = 22.0,
         aspect: float = 16 / 9,
         up=(0.0, 1.0, 0.0),
         field_of_view: float = 35.0,
     ) -> "Camera":
         """Return a camera that sees the whole box; a 2D box is seen from the front without perspective.
 
-        `azimuth` and `elevation` [degrees] turn the eye around `up` and above the ground; at azimuth 0 the x axis
-        runs to the right of the picture.
+        `azimuth` and `elevation` [degrees] turn the eye around `up` and above the ground; at azimuth 0
+        the x axis runs to the right of the picture.
         """
         corners = box_corners(lower, upper)
         centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
         extent = np.ptp(corners, axis=0)
         if len(corners) == 4:
-            height = max(extent[1], extent[0] / aspect) / MARGIN
-            eye = centre + (0.0, 0.0, float(np.max(extent)) + 1.0)
-            return cls(tuple(eye), tuple(centre), orthographic_height=float(height))
+            height = float(max(extent[1], extent[0] / aspect)) / MARGIN
+            eye = centre + np.array([0.0, 0.0, np.max(extent) + 1.0])
+            return cls(tuple(eye), tuple(centre), orthographic_height=height)
         across, front, upward = _turntable(up)
         az, el = np.radians(azimuth), np.radians(elevation)
         outward = np.cos(el) * (np.sin(az) * across + np.cos(az) * front) + np.sin(el) * upward
         camera = cls(tuple(centre + outward), tuple(centre), tuple(up), field_of_view)
         half_height = np.tan(np.radians(field_of_view) / 2) * MARGIN
-        for _ in range(6):  # perspective makes the near side larger: move the box to the middle of the picture
+        for _ in range(
+            6
+        ):  # perspective makes the near side larger: move the box to the middle of the picture
             camera, distance = _back_off(camera, corners, outward, half_height, aspect)
             right, above, _ = camera.basis()
             flat = camera.project(corners, 2, 2)[:, :2]
-            middle = (0.5 * (flat.min(axis=0) + flat.max(axis=0)) - 1.0) * np.tan(np.radians(field_of_view) / 2)
+            middle = (0.5 * (flat.min(axis=0) + flat.max(axis=0)) - 1.0) * np.tan(
+                np.radians(field_of_view) / 2
+            )
             target = np.asarray(camera.target) + distance * (middle[0] * right - middle[1] * above)
             camera = replace(camera, eye=tuple(target + distance * outward), target=tuple(target))
         return _back_off(camera, corners, outward, half_height, aspect)[0]
@@ -100,10 +104,40 @@ class Camera:
         forward = np.subtract(self.target, self.eye, dtype=float)
         forward = forward / np.linalg.norm(forward)
         right = np.cross(forward, np.asarray(self.up, float))
-        if np.linalg.norm(right) < 1e-6 * max(np.linalg.norm(self.up), 1e-30):  # looking along `up`
+        if np.linalg.norm(right) < 1e-6 * float(np.linalg.norm(self.up)):  # looking along `up`
             right = np.cross(forward, np.roll(np.asarray(self.up, float), 1))
         right = right / np.linalg.norm(right)
         return right, np.cross(right, forward), forward
+
+    def orbited(self, azimuth: float, elevation: float) -> "Camera":
+        """Return the camera turned around its target by angles [degrees]; it stops short of the poles."""
+        across, front, upward = _turntable(self.up)
+        offset = np.subtract(self.eye, self.target, dtype=float)
+        distance = float(np.linalg.norm(offset))
+        az = np.arctan2(offset @ across, offset @ front) + np.radians(azimuth)
+        el = np.arcsin(np.clip(offset @ upward / distance, -1, 1)) + np.radians(elevation)
+        el = np.clip(el, -1.55, 1.55)
+        outward = np.cos(el) * (np.sin(az) * across + np.cos(az) * front) + np.sin(el) * upward
+        return replace(self, eye=tuple(np.asarray(self.target) + distance * outward))
+
+    def panned(self, right: float, up: float) -> "Camera":
+        """Return the camera moved sideways by shares of the picture's height at the target."""
+        across, above, _ = self.basis()
+        shift = self.view_height() * (right * across + up * above)
+        return replace(self, eye=tuple(self.eye + shift), target=tuple(self.target + shift))
+
+    def zoomed(self, factor: float) -> "Camera":
+        """Return the camera that sees `factor` times as much: below 1 is closer."""
+        if self.orthographic_height is not None:
+            return replace(self, orthographic_height=factor * self.orthographic_height)
+        offset = np.subtract(self.eye, self.target, dtype=float)
+        return replace(self, eye=tuple(np.asarray(self.target) + factor * offset))
+
+    def view_height(self) -> float:
+        """Return the height [m] of the picture at the target's distance."""
+        distance = float(np.linalg.norm(np.subtract(self.eye, self.target, dtype=float)))
+        height = 2 * distance * float(np.tan(np.radians(self.field_of_view) / 2))
+        return height if self.orthographic_height is None else self.orthographic_height
 
     def focal_pixels(self, height: int) -> float:
         """Return pixels per metre at unit depth (perspective) or everywhere (orthographic)."""
@@ -131,7 +165,7 @@ class Camera:
 
 
 def _turntable(up) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the directions that azimuth and elevation refer to: across (azimuth 90), front (azimuth 0), up."""
+    """Return the turntable's axes: across (where azimuth is 90 degrees), front (azimuth 0) and up."""
     upward = np.asarray(up, float) / np.linalg.norm(up)
     across = np.array([1.0, 0.0, 0.0]) if abs(upward[0]) < 0.9 else np.array([0.0, -1.0, 0.0])
     front = np.cross(across, upward)

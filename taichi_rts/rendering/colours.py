@@ -11,7 +11,7 @@ def _rgb(*codes: str) -> np.ndarray:
     return np.array([[int(code[k : k + 2], 16) / 255 for k in (1, 3, 5)] for code in codes], np.float32)
 
 
-# Row k is level k + 1. The first three stay apart for deutan, protan and tritan eyes (the paper's red, green, blue);
+# Row k is level k + 1. The first three (the paper's red, green, blue) stay apart for deutan and protan eyes;
 # the later ones alternate in lightness, since levels that deep are seldom seen together.
 _DEFAULT = _rgb(
     *("#D55E00", "#7FD8B8", "#0072B2", "#F0C929", "#7B2D8B", "#B8B8B8", "#4A2B12", "#F29BC1"),
@@ -22,7 +22,7 @@ PALETTES: dict[str, np.ndarray] = {
     "paper": np.concatenate([_rgb("#E02020", "#20B020", "#2040E0"), _DEFAULT[3:]]),
 }
 
-# Anchors of equal distance; lightness rises steadily in the first, and is highest in the middle of the second.
+# Evenly spaced anchors; lightness rises steadily in the first, and is highest in the middle of the second.
 COLORMAPS: dict[str, np.ndarray] = {
     "lagoon": _rgb("#1A1450", "#25418C", "#20719A", "#2C9F8E", "#6CC76B", "#C6E04F", "#FFF3A0"),
     "balance": _rgb("#1B4F9C", "#6FA3D8", "#F2F2F2", "#E39A6C", "#A33A1A"),
@@ -36,7 +36,7 @@ def _choose(kind: str, name: str, choices: dict):
 
 
 def level_colours(levels, palette: str = "default") -> np.ndarray:
-    """Return (N, 3) colours of region levels, counted from 1; levels beyond the palette take its last colour."""
+    """Return (N, 3) colours of levels, counted from 1; levels beyond the palette take its last colour."""
     table = _choose("palette", palette, PALETTES)
     return table[np.clip(np.asarray(levels, np.int64) - 1, 0, len(table) - 1)]
 
@@ -49,7 +49,7 @@ def scalar_colours(values, lower: float, upper: float, colormap: str = "lagoon")
     with np.errstate(invalid="ignore"):
         place = np.clip((values - lower) / span, 0.0, 1.0)
     finite = np.isfinite(values)
-    # 1024 steps are finer than 8 bits can show, and a look-up is much faster than interpolating three channels.
+    # 1024 steps are finer than 8 bits can show, and a look-up is faster than interpolating three channels.
     steps = np.linspace(0, len(table) - 1, 1024)
     fine = np.stack([np.interp(steps, np.arange(len(table)), table[:, k]) for k in range(3)], axis=1)
     colours = fine.astype(np.float32)[(np.where(finite, place, 0) * 1023 + 0.5).astype(np.int64)]

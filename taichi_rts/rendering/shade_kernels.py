@@ -1,15 +1,15 @@
 """Taichi kernels of the splatter: from nearest depths and particles to a lit picture.
 
-Ambient occlusion and shadow are found once per final pixel (a `veil`: depth, openness to the sky, light), then every
-supersample is lit on its own and the average goes from linear light to sRGB.
+Ambient occlusion and shadow are found once per final pixel (a `veil`: depth, openness to the sky, light),
+then every supersample is lit on its own and the average goes from linear light to sRGB.
 """
 
+import numpy as np
 import taichi as ti
 
 from taichi_rts.rendering.splat_kernels import (
     FAR,
     NOBODY,
-    Floats,
     Ints,
     Vectors3,
     Vectors4,
@@ -20,12 +20,28 @@ from taichi_rts.rendering.splat_kernels import (
 
 AO_PAIRS = 8
 SHADOW_TAPS = 8
+TAPS = AO_PAIRS + SHADOW_TAPS
+TURNS = 16  # sampling patterns, one for each pixel of a 4 x 4 tile
+GOLDEN = np.pi * (3 - np.sqrt(5))
 NOTHING = 1e30  # depth of a pixel that shows neither fluid nor ground
+
+
+def sampling_pattern() -> np.ndarray:
+    """Return (TURNS * TAPS, 3): direction and distance in units of the reach, on a golden-angle spiral."""
+    turn = np.arange(TURNS)[:, None] / TURNS
+    pair, tap = np.arange(AO_PAIRS), np.arange(SHADOW_TAPS)
+    angle = np.concatenate([GOLDEN * pair + np.pi * turn, GOLDEN * tap + 2 * np.pi * turn], axis=1)
+    share = (np.concatenate([pair, tap]) + 0.5) / np.repeat([AO_PAIRS, SHADOW_TAPS], [AO_PAIRS, SHADOW_TAPS])
+    # occlusion is sampled densely close by, light evenly over a disc
+    near = ((pair + turn + 0.5) / AO_PAIRS) ** 2
+    even = np.broadcast_to(np.sqrt(share[AO_PAIRS:]), (TURNS, SHADOW_TAPS))
+    distance = np.concatenate([near, even], axis=1)
+    return np.stack([np.cos(angle), np.sin(angle), distance], axis=-1).reshape(-1, 3).astype(np.float32)
 
 
 @ti.func
 def view_offset(x, y, z, lens):
-    """Position of pixel (x, y) at depth z, relative to the eye, along right and up (pixels count downward)."""
+    """Position of pixel (x, y) at depth z from the eye, along right and up (pixels count downward)."""
     unit = metres_per_pixel(z, lens)
     return (x - lens[2]) * unit, (lens[3] - y) * unit
 
@@ -49,23 +65,25 @@ def ground_depth(x, y, lens, ground, ground_reach):
 
 
 @ti.func
-def open_sky(x, y, z, turn, reach, lens, width, height, depth: ti.template()):
+def open_sky(x, y, z, turn, reach, lens, width, height, pattern: ti.template(), depth: ti.template()):
     """Share of the sky that the depths around a pixel leave open.
 
-    Opposite samples are taken in pairs and their slopes added, so that a plane, however tilted, hides nothing.
+    Opposite samples are taken in pairs and their slopes added, so that a plane, however tilted, hides
+    nothing.
     """
     unit = metres_per_pixel(z, lens)
+    widen = reach / unit
     blocked = ti.f32(0.0)
     for k in range(AO_PAIRS):
-        place = (ti.cast(k, ti.f32) + ti.f32(0.5) + turn) / ti.cast(AO_PAIRS, ti.f32)
-        angle = ti.f32(2.399963) * ti.cast(k, ti.f32) + turn * ti.f32(3.14159265)
-        distance = ti.max(reach * place * place, ti.f32(2.0) * unit)
-        dx = distance / unit * ti.cos(angle)
-        dy = distance / unit * ti.sin(angle)
+        arm = pattern[turn * TAPS + k]
+        span = ti.max(arm[2] * widen, ti.f32(2.0))  # [pixels]
+        dx = arm[0] * span
+        dy = arm[1] * span
+        distance = span * unit
         slope = ti.f32(0.0)
         for side in ti.static((-1, 1)):
-            u = ti.min(ti.max(ti.floor(x + side * dx, ti.i32), 0), width - 1)
-            v = ti.min(ti.max(ti.floor(y + side * dy, ti.i32), 0), height - 1)
+            u = ti.min(ti.max(ti.cast(x + side * dx, ti.i32), 0), width - 1)
+            v = ti.min(ti.max(ti.cast(y + side * dy, ti.i32), 0), height - 1)
             bits = depth[v * width + u]
             rise = -distance  # nothing there: as open as a slope of 45 degrees away from the viewer
             if bits != FAR:
@@ -95,6 +113,7 @@ def measure_veil(
     width: ti.i32,
     height: ti.i32,
     supersample: ti.i32,
+    pattern: Vectors3,
     veil: Vectors3,
 ):
     """Find depth, openness and light of each final pixel, with a pattern that turns from pixel to pixel.
@@ -115,8 +134,8 @@ def measure_veil(
         result = vec3(NOTHING, 1, 1)
         if z < ti.f32(NOTHING):
             # 16 turns in a 4 x 4 tile, neighbours far apart; the blur over 4 x 4 pixels then sees each once
-            turn = ti.cast(((row & 3) * 4 + (column & 3)) * 7 % 16, ti.f32) / ti.f32(16.0)
-            openness = open_sky(x, y, z, turn, reach, lens, width, height, depth)
+            turn = ((row & 3) * 4 + (column & 3)) * 7 % TURNS
+            openness = open_sky(x, y, z, turn, reach, lens, width, height, pattern, depth)
             side, above = view_offset(x, y, z, lens)
             spot = vec3(side, above, z) - light_origin
             u = light_lens[2] + light_lens[0] * spot.dot(light_right)
@@ -124,10 +143,9 @@ def measure_veil(
             limit = spot.dot(light_forward) - ti.select(on_ground, ti.f32(0.0), bias)
             lit = ti.f32(0.0)
             for k in range(SHADOW_TAPS):
-                far_out = ti.sqrt((ti.cast(k, ti.f32) + ti.f32(0.5)) / ti.cast(SHADOW_TAPS, ti.f32)) * softness
-                angle = ti.f32(2.399963) * ti.cast(k, ti.f32) + turn * ti.f32(6.2831853)
-                i = ti.floor(u + far_out * ti.cos(angle), ti.i32)
-                j = ti.floor(v + far_out * ti.sin(angle), ti.i32)
+                arm = pattern[turn * TAPS + AO_PAIRS + k]
+                i = ti.floor(u + softness * arm[2] * arm[0], ti.i32)
+                j = ti.floor(v + softness * arm[2] * arm[1], ti.i32)
                 clear = ti.f32(1.0)
                 if i >= 0 and i < shadow_size and j >= 0 and j < shadow_size:
                     if ti.bit_cast(shadows[j * shadow_size + i], ti.f32) < limit:
@@ -145,6 +163,18 @@ def smooth_veil(veil: Vectors3, tolerance: ti.f32, columns: ti.i32, rows: ti.i32
         if middle[0] < ti.f32(NOTHING):
             row = p // columns
             column = p - row * columns
+            corner = ti.min(row + 1, rows - 1) * columns
+            opposite = ti.max(row - 2, 0) * columns
+            left = ti.max(column - 2, 0)
+            right = ti.min(column + 1, columns - 1)
+            least = ti.min(middle[1], middle[2])
+            least = ti.min(least, veil[corner + left][1], veil[corner + left][2])
+            least = ti.min(least, veil[corner + right][1], veil[corner + right][2])
+            least = ti.min(least, veil[opposite + left][1], veil[opposite + left][2])
+            least = ti.min(least, veil[opposite + right][1], veil[opposite + right][2])
+            if least == ti.f32(1.0):  # open and lit all around, as most of the ground is
+                smooth[p] = middle
+                continue
             total = vec3(0, 0, 0)
             for v in range(ti.max(row - 2, 0), ti.min(row + 2, rows)):
                 for u in range(ti.max(column - 2, 0), ti.min(column + 2, columns)):
@@ -158,7 +188,7 @@ def smooth_veil(veil: Vectors3, tolerance: ti.f32, columns: ti.i32, rows: ti.i32
 
 @ti.func
 def veil_at(row, column, z, tolerance, columns, rows, veil: ti.template()):
-    """Veil of a final pixel, or of the neighbour that is nearest in depth where a silhouette crosses the pixel."""
+    """Veil of a final pixel; where a silhouette crosses it, of the neighbour nearest in depth."""
     best = veil[row * columns + column]
     if ti.abs(best[0] - z) > tolerance:
         for v in range(ti.max(row - 1, 0), ti.min(row + 2, rows)):
@@ -190,7 +220,7 @@ def shade_picture(
     supersample: ti.i32,
     picture: Ints,
 ):
-    """Light every supersample, average in linear light and pack sRGB bytes; directions are in view coordinates."""
+    """Light every supersample, average and pack sRGB bytes; directions are in view coordinates."""
     columns = width // supersample
     rows = height // supersample
     tolerance = ti.f32(4.0) * radius
@@ -201,9 +231,9 @@ def shade_picture(
         row = p // columns
         column = p - row * columns
         total = vec3(0, 0, 0)
-        for sample in range(supersample * supersample):
-            v = row * supersample + sample // supersample
-            u = column * supersample + sample % supersample
+        for sub_row, sub_column in ti.ndrange(supersample, supersample):
+            v = row * supersample + sub_row
+            u = column * supersample + sub_column
             s = v * width + u
             number = nearest[s]
             colour = background
@@ -229,9 +259,11 @@ def shade_picture(
                     gap = ti.bit_cast(depth[j * width + i], ti.f32) - z
                     behind = ti.max(behind, ti.min(gap / (ti.f32(8.0) * radius) - ti.f32(0.25), one))
                 tint = tints[number]
-                glow = ti.f32(0.50) * above * air[1] + ti.f32(0.95) * direct * (ti.f32(0.5) + ti.f32(0.5) * air[1])
+                glow = ti.f32(0.50) * above * air[1] + ti.f32(0.95) * direct * (
+                    ti.f32(0.5) + ti.f32(0.5) * air[1]
+                )
                 colour = tint * glow * (one - ti.f32(0.35) * behind)
-                colour += vec3(1, 1, 1) * (ti.f32(0.10) * shine * air[2] * air[1])
+                colour += ti.f32(0.10) * shine * air[2] * air[1]
             else:
                 air = veil[p]
                 if ground_shade > 0:

@@ -1,20 +1,22 @@
 """Taichi kernels of the splatter: from points to nearest depth and nearest particle per pixel.
 
-They are module-level functions, so several splatters share one compilation. All numbers are cast to f32 where they
-meet literals, since a literal has the run's default precision, which may be f64. Buffers are flat: y * width + x.
+They are module-level functions, so several splatters share one compilation. Literals are cast to f32, since a
+literal has the run's default precision, which may be f64. Buffers are flat: y * width + x.
 
 A lens is (pixels per metre at unit depth, 1 if perspective else 0, width / 2, height / 2).
 """
 
+from typing import Any
+
 import taichi as ti
 
-vec3 = ti.types.vector(3, ti.f32)
-vec4 = ti.types.vector(4, ti.f32)
-Floats = ti.types.ndarray(dtype=ti.f32, ndim=1)
-Ints = ti.types.ndarray(dtype=ti.i32, ndim=1)
-Vectors3 = ti.types.ndarray(dtype=vec3, ndim=1)
-Vectors4 = ti.types.ndarray(dtype=vec4, ndim=1)
-Table = ti.types.ndarray(dtype=ti.f32, ndim=2)
+vec3: Any = ti.types.vector(3, ti.f32)
+vec4: Any = ti.types.vector(4, ti.f32)
+Floats: Any = ti.types.ndarray(dtype=ti.f32, ndim=1)
+Ints: Any = ti.types.ndarray(dtype=ti.i32, ndim=1)
+Vectors3: Any = ti.types.ndarray(dtype=vec3, ndim=1)
+Vectors4: Any = ti.types.ndarray(dtype=vec4, ndim=1)
+Table: Any = ti.types.ndarray(dtype=ti.f32, ndim=2)
 
 FAR = 0x7F000000  # bit pattern of a depth no particle has (1.7e38 m)
 NOBODY = 0x7FFFFFFF
@@ -76,8 +78,10 @@ def clear_buffer(buffer: Ints, value: ti.i32):
 
 
 @ti.func
-def splat(sprite, number, lens, width, height, depth: ti.template(), nearest: ti.template(), naming: ti.template()):
-    """Visit the pixels of one sphere, row by row, and enter its depth, or its number where it is the nearest."""
+def splat(
+    sprite, number, lens, width, height, depth: ti.template(), nearest: ti.template(), naming: ti.template()
+):
+    """Visit the pixels of one sphere and enter its depth, or its number where it is the nearest."""
     half = ti.f32(0.5)
     zero = ti.f32(0.0)
     size = sprite[3]
@@ -125,7 +129,7 @@ def splat_numbers(
 def trace_lines(
     ends: Table,
     steps: ti.i32,
-    half_width: ti.i32,
+    half_width: ti.f32,
     lens: vec4,
     width: ti.i32,
     height: ti.i32,
@@ -135,12 +139,16 @@ def trace_lines(
     depth: Ints,
     lines: Ints,
 ):
-    """Draw segments (x, y, z of both ends) as coverage 0 to 255: `seen` in front of all spheres, else `hidden`."""
+    """Draw segments (x, y, z of both ends) with strength `seen` in front of all spheres, else `hidden`."""
+    border = ti.ceil(half_width, ti.i32) + 1
     for edge, step in ti.ndrange(ends.shape[0], steps + 1):
         t = ti.cast(step, ti.f32) / ti.cast(steps, ti.f32)
         s = ti.f32(1.0) - t
-        x = s * ends[edge, 0] + t * ends[edge, 3]
-        y = s * ends[edge, 1] + t * ends[edge, 4]
+        run = ends[edge, 3] - ends[edge, 0]
+        rise = ends[edge, 4] - ends[edge, 1]
+        length = ti.max(ti.sqrt(run * run + rise * rise), ti.f32(1e-6))
+        x = ends[edge, 0] + t * run
+        y = ends[edge, 1] + t * rise
         near = ends[edge, 2]
         far = ends[edge, 5]
         # along a straight line in the picture, 1/z is linear under perspective and z without it
@@ -149,7 +157,12 @@ def trace_lines(
             limit = ti.bit_cast(ti.max(z - bias, ti.f32(0.0)), ti.i32)
             column = ti.floor(x, ti.i32)
             row = ti.floor(y, ti.i32)
-            for v in range(ti.max(row - half_width, 0), ti.min(row + half_width + 1, height)):
-                for u in range(ti.max(column - half_width, 0), ti.min(column + half_width + 1, width)):
+            for v in range(ti.max(row - border, 0), ti.min(row + border + 1, height)):
+                for u in range(ti.max(column - border, 0), ti.min(column + border + 1, width)):
+                    dx = ti.cast(u, ti.f32) + ti.f32(0.5) - x
+                    dy = ti.cast(v, ti.f32) + ti.f32(0.5) - y
+                    off = ti.abs(dx * rise - dy * run) / length
+                    cover = ti.min(ti.max(half_width + ti.f32(0.5) - off, ti.f32(0.0)), ti.f32(1.0))
                     p = v * width + u
-                    ti.atomic_max(lines[p], ti.select(limit <= depth[p], seen, hidden))
+                    full = ti.select(limit <= depth[p], seen, hidden)
+                    ti.atomic_max(lines[p], ti.cast(cover * ti.cast(full, ti.f32), ti.i32))

@@ -1,7 +1,7 @@
 """The default renderer: spheres splatted in software by Taichi kernels, on any arch, without a display.
 
-The nearest depth per pixel is an integer minimum and ties go to the lowest index, so that the same arrays give the
-same bits on one arch, whatever the threads did.
+The nearest depth per pixel is an integer minimum and ties go to the lowest index, so that the same arrays
+give the same bits on one arch, whatever the threads did.
 """
 
 import numpy as np
@@ -32,10 +32,13 @@ def checked_arrays(positions, colours, radius: float) -> tuple[np.ndarray, np.nd
     positions = np.asarray(positions, np.float32)
     colours = np.asarray(colours, np.float32)
     if positions.ndim != 2 or positions.shape[1] not in (2, 3):
-        raise RenderError(f"positions have shape {positions.shape}, must be (N, 2) or (N, 3): pass one row a particle")
+        raise RenderError(
+            f"positions have shape {positions.shape}, must be (N, 2) or (N, 3): pass one row a particle"
+        )
     if colours.shape != (len(positions), 3):
         raise RenderError(
-            f"colours have shape {colours.shape}, must be ({len(positions)}, 3): pass one RGB row for each position"
+            f"colours have shape {colours.shape}, must be ({len(positions)}, 3): "
+            "pass one RGB row for each position"
         )
     if not radius > 0:
         raise RenderError(f"radius = {radius} m must be above 0: half the particle spacing is a good choice")
@@ -51,13 +54,18 @@ class Splatter:
     """Draws particles as lit spheres into a NumPy image; call after `ti.init`."""
 
     def __init__(
-        self, width: int = 1280, height: int = 720, supersample: int = 2, background=(1, 1, 1), shadows: bool = True
+        self,
+        width: int = 1280,
+        height: int = 720,
+        supersample: int = 2,
+        background=(1, 1, 1),
+        shadows: bool = True,
     ):
-        """Allocate the picture's buffers; `background` is sRGB, `supersample` the samples per pixel and axis."""
+        """Allocate the buffers; `background` is sRGB, `supersample` the samples per pixel and axis."""
         if min(width, height) < 1 or not 1 <= supersample <= 8 or width * height * supersample**2 > 2**29:
             raise RenderError(
-                f"picture of {width} x {height} pixels with supersample = {supersample} is not possible: sides must "
-                "be at least 1, supersample 1 to 8, and all samples at most 2^29: lower one of them"
+                f"picture of {width} x {height} pixels with supersample = {supersample} is impossible: "
+                "sides must be at least 1, supersample 1 to 8, all samples at most 2^29: lower one of them"
             )
         self.width, self.height, self.supersample, self.shadows = width, height, supersample, shadows
         self._background = srgb_to_linear(background)
@@ -70,6 +78,9 @@ class Splatter:
         self._linear.from_numpy(srgb_to_linear(np.linspace(0, 1, 255 * 4 + 1)))
         self._encode = ti.ndarray(ti.i32, 4096)  # entry k is linear light (k / 4095)^2
         self._encode.from_numpy(np.rint(255 * linear_to_srgb(np.linspace(0, 1, 4096) ** 2)).astype(np.int32))
+        pattern = shade_kernels.sampling_pattern()
+        self._pattern = ti.Vector.ndarray(3, ti.f32, len(pattern))
+        self._pattern.from_numpy(pattern)
         self._capacity = 0
         self._reserve(1)
 
@@ -84,8 +95,9 @@ class Splatter:
     def draw(self, positions, colours, radius: float, camera: Camera, outline=None) -> np.ndarray:
         """Return the picture, (height, width, 3) uint8.
 
-        `positions` (N, 2 or 3) [m] and `radius` [m] are in the scene's units, `colours` (N, 3) are sRGB in 0 to 1;
-        `outline` is (lower, upper) of a box to draw as a wireframe, whose floor then catches the shadows.
+        `positions` (N, 2 or 3) [m] and `radius` [m] are in the scene's units, `colours` (N, 3) are
+        sRGB in 0 to 1; `outline` is (lower, upper) of a box to draw as a wireframe,
+        whose floor then catches the shadows.
         """
         flat = np.ndim(positions) == 2 and np.shape(positions)[1] == 2
         positions, colours = checked_arrays(positions, colours, radius)
@@ -115,13 +127,13 @@ class Splatter:
         if count:
             self._project(count, radius, eye, basis, lens)
             splat_kernels.splat_depths(self._sprites, count, lens, width, height, self._depth)
-            splat_kernels.splat_numbers(
-                self._sprites, count, lens, width, height, self._depth, self._nearest
-            )
+            splat_kernels.splat_numbers(self._sprites, count, lens, width, height, self._depth, self._nearest)
         if outline is not None:
             self._trace(outline, camera, lens, radius)
         extent = float(np.linalg.norm(box[1] - box[0]))
-        ground, ground_reach = _ground(camera, basis, box, extent, self.shadows and outline is not None and not flat)
+        ground, ground_reach = _ground(
+            camera, basis, box, extent, self.shadows and outline is not None and not flat
+        )
         reach = max(5 * radius, 0.03 * extent)
         texel = 1.0 / light_lens[0]
         softness = max(0.012 * extent / texel, 1.5)
@@ -140,9 +152,12 @@ class Splatter:
             width,
             height,
             self.supersample,
+            self._pattern,
             self._veil,
         )
-        shade_kernels.smooth_veil(self._veil, max(4 * radius, 0.01 * extent), self.width, self.height, self._smooth_veil)
+        shade_kernels.smooth_veil(
+            self._veil, max(4 * radius, 0.01 * extent), self.width, self.height, self._smooth_veil
+        )
         picture = np.empty(self.width * self.height, np.int32)
         shade_kernels.shade_picture(
             self._sprites,
@@ -189,14 +204,14 @@ class Splatter:
         table = np.array(segments, np.float32)
         longest = float(np.max(np.abs(table[:, :2] - table[:, 3:5])))
         steps = int(min(longest + 2, 1e5))
-        half_width = max(round(0.5 * self.supersample * self.height / 720), 0)
+        half_width = 0.5 * self.supersample * max(self.height / 720, 1.0)
         splat_kernels.trace_lines(
             table, steps, half_width, lens, width, height, 2 * radius, 200, 45, self._depth, self._lines
         )
 
 
 def _bounds(positions: np.ndarray, outline) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners of what is drawn: the outline if there is one, which keeps light and shadow steady."""
+    """Return the bounds of the picture: the outline if there is one, so that light stays steady."""
     if outline is not None:
         corners = box_corners(*outline)
         return corners.min(axis=0), corners.max(axis=0)
@@ -217,7 +232,11 @@ def _light_view(light: np.ndarray, box, radius: float):
     middle = 0.5 * (box[0] + box[1])
     reach = 0.5 * float(np.linalg.norm(box[1] - box[0])) + 2 * radius
     view = Camera(tuple(middle + light * (reach + 2 * radius)), tuple(middle), tuple(np.roll(light, 1)))
-    return np.array(view.basis()), np.array(view.eye), (SHADOW_SIZE / (2 * reach), 0.0, SHADOW_SIZE / 2, SHADOW_SIZE / 2)
+    return (
+        np.array(view.basis()),
+        np.array(view.eye),
+        (SHADOW_SIZE / (2 * reach), 0.0, SHADOW_SIZE / 2, SHADOW_SIZE / 2),
+    )
 
 
 def _ground(camera: Camera, basis: np.ndarray, box, extent: float, wanted: bool):

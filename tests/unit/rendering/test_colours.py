@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+
+from taichi_rts.errors import RenderError
+from taichi_rts.rendering.colours import COLORMAPS, PALETTES, PLAIN, colour_by, level_colours, scalar_colours
+
+
+def cielab(colours):
+    """CIE L*a*b* (D65) of sRGB rows."""
+    colours = np.asarray(colours, float)
+    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    x, y, z = np.cbrt(linear @ to_xyz.T / (0.9505, 1.0, 1.089)).T
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=1)
+
+
+@pytest.mark.parametrize("palette", list(PALETTES))
+def test_colours_of_a_palette_are_far_apart(palette):
+    lab = cielab(level_colours(np.arange(1, 17), palette))
+    distance = np.linalg.norm(lab[:, None] - lab[None], axis=-1) + 1e9 * np.eye(16)
+    assert distance[:3, :3].min() > 54
+    assert distance[:5, :5].min() > 35
+    assert distance.min() > 14
+
+
+def test_first_levels_and_the_ends_of_the_palette():
+    codes = np.rint(255 * level_colours([1, 2, 3])).astype(int)
+    assert codes.tolist() == [[0xD5, 0x5E, 0x00], [0x7F, 0xD8, 0xB8], [0x00, 0x72, 0xB2]]
+    red, green, blue = level_colours([1, 2, 3], "paper")
+    assert red.argmax() == 0
+    assert green.argmax() == 1
+    assert blue.argmax() == 2
+    assert np.array_equal(level_colours([99, 0]), level_colours([16, 1]))
+    assert level_colours([1]).dtype == np.float32
+
+
+def test_lightness_of_the_speed_map_rises_steadily():
+    lightness = cielab(scalar_colours(np.linspace(0, 1, 200), 0, 1))[:, 0]
+    assert np.all(np.diff(lightness) > -0.05)
+    assert np.ptp(lightness) > 70
+
+
+def test_scalar_colours_clip_and_mark_what_is_not_finite():
+    got = scalar_colours(np.array([-5.0, 0.0, 2.0, 9.0, np.nan, np.inf]), 0.0, 2.0)
+    assert np.allclose(got[[0, 1]], COLORMAPS["lagoon"][0], atol=2e-3)
+    assert np.allclose(got[[2, 3]], COLORMAPS["lagoon"][-1], atol=2e-3)
+    assert got[4].tolist() == got[5].tolist() == [1, 0, 1]
+
+
+def test_modes():
+    speeds, levels = np.array([0.0, 1.0, 2.0]), np.array([3, 2, 1])
+    assert np.array_equal(colour_by("level", levels=levels), level_colours(levels))
+    assert np.array_equal(colour_by("speed", speeds=speeds), scalar_colours(speeds, 0, 2))
+    assert np.array_equal(colour_by("speed", speeds=speeds, max_speed=4), scalar_colours(speeds, 0, 4))
+    rest = colour_by("density", densities=np.array([1000.0]), rest_density=1000.0)
+    assert np.allclose(rest, 0xF2 / 255, atol=5e-3)
+    plain = colour_by("plain", levels=levels)
+    assert plain.shape == (3, 3)
+    assert np.allclose(plain, PLAIN)
+
+
+def test_unknown_names_list_the_choices():
+    with pytest.raises(RenderError, match=r"'vorticity'.*level, speed, density, plain"):
+        colour_by("vorticity", levels=[1])
+    with pytest.raises(RenderError, match="default, paper"):
+        level_colours([1], "nature")
+    with pytest.raises(RenderError, match="needs speeds"):
+        colour_by("speed", levels=[1])
+    with pytest.raises(RenderError, match="at least one"):
+        colour_by("plain")
