@@ -113,9 +113,7 @@ def _start(name: str, precision: str, options: dict[str, Any]) -> bool:
     settings = {"log_level": ti.ERROR, "enable_fallback": False} | options
     try:
         with contextlib.redirect_stdout(io.StringIO()):  # its banner would break progress bars and piped output
-            ti.init(
-                arch=getattr(ti, name), default_fp=PRECISIONS[precision][0], default_ip=ti.i32, **settings
-            )
+            ti.init(arch=getattr(ti, name), default_fp=PRECISIONS[precision][0], default_ip=ti.i32, **settings)
     except RuntimeError:
         return False
     return True

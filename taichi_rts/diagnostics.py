@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time as clock
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
+import taichi as ti
 
 from taichi_rts.physics.medium import Medium
 from taichi_rts.scene import Scene
@@ -76,7 +79,66 @@ class Tally:
         }
 
 
-def speedup_bound(level_fractions: Sequence[float]) -> float:
-    """Upper bound for the speed-up over uniform steps of the base step: 1 / sum_n f_n / n, with no overhead at all."""
-    work = sum(f / n for n, f in enumerate(level_fractions, start=1))
-    return 1.0 / work if work > 0.0 else 1.0
+class Stopwatch:
+    """Adds up the time spent inside its `with` blocks while `running`; waits for the device at both ends."""
+
+    def __init__(self) -> None:
+        self.running = False
+        self.seconds = 0.0
+        self._began = 0.0
+
+    def __enter__(self) -> None:
+        if self.running:
+            ti.sync()
+            self._began = clock.perf_counter()
+
+    def __exit__(self, *_: object) -> None:
+        if self.running:
+            ti.sync()
+            self.seconds += clock.perf_counter() - self._began
+
+
+class Overhead:
+    """Measures what everybody pays in a step against what the due particles pay, on every `EVERY`-th step.
+
+    Waiting for the device costs a GPU a little, so only a sample is timed.
+    """
+
+    EVERY = 64
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self.shared = Stopwatch()
+        self.due = Stopwatch()
+        self.samples = 0
+        self.updates = 0
+        self._steps = 0
+
+    @contextmanager
+    def sampled_step(self, due_count: ti.Field) -> Iterator[None]:
+        """Time the step inside if it is its turn; `due_count` then says how many particles it updated."""
+        self._steps += 1
+        if self._steps % self.EVERY:
+            yield
+            return
+        self.shared.running = self.due.running = True
+        yield
+        self.shared.running = self.due.running = False
+        self.samples += 1
+        self.updates += int(due_count[None])
+
+    @property
+    def fraction(self) -> float | None:
+        """Epsilon: shared time over the time of a step in which all particles are due; None before the first sample."""
+        if not self.updates:
+            return None
+        shared = self.shared.seconds / self.samples
+        return shared / (shared + self.due.seconds / self.updates * self.count)
+
+
+def speedup_bound(active_fraction: float, overhead_fraction: float) -> float:
+    """Upper bound for the speed-up over uniform steps of the base step: 1 / (e + (1-e) a).
+
+    `active_fraction` a holds sum_n f_n/n and the recomputation by pre-emption; `overhead_fraction` e is paid by all.
+    """
+    return 1.0 / (overhead_fraction + (1.0 - overhead_fraction) * active_fraction)

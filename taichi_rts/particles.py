@@ -42,7 +42,7 @@ class Particles:
         self.a = vector_field(self.dim, backend.dtype, self.count)
         self.rho = ti.field(backend.dtype, self.count)
         self.has_rho_rate = with_rho_rate
-        self.rho_rate = ti.field(backend.dtype, self.count) if with_rho_rate else None
+        self.rho_rate: Any = ti.field(backend.dtype, self.count) if with_rho_rate else None
         self.updated = ti.field(ti.i32, self.count)
         self.level = ti.field(ti.i32, self.count)
         self.identity = ti.field(ti.i32, self.count)

@@ -183,6 +183,9 @@ class Scene:
         return pydantic.TypeAdapter(Scene).dump_python(self, mode="json", exclude_none=True)
 
 
+_KEYS = [key for cls in (Scene, Box, Block, View) for key in cls.__dataclass_fields__]  # type: ignore[attr-defined]
+
+
 def load_scene(name: str | Path, *, particles: float | str | None = None, **changes: Any) -> Scene:
     """Return a built-in scene by name, or the scene in a TOML file.
 
@@ -215,7 +218,7 @@ def scene_from(data: dict[str, Any], source: str = "scene") -> Scene:
     try:
         return pydantic.TypeAdapter(Scene).validate_python(data)
     except pydantic.ValidationError as error:
-        raise SceneError(describe(error, source, {f.name: f for f in dataclasses.fields(Scene)})) from None  # type: ignore[arg-type]
+        raise SceneError(describe(error, source, _KEYS)) from None
 
 
 def scene_names() -> list[str]:
@@ -288,6 +291,5 @@ def _contradictions(scene: Scene) -> list[str]:
 
 def _overlap(one: Block, two: Block, slack: float) -> bool:
     return all(
-        a < d - slack and c < b - slack
-        for a, b, c, d in zip(one.lower, one.upper, two.lower, two.upper, strict=True)
+        a < d - slack and c < b - slack for a, b, c, d in zip(one.lower, one.upper, two.lower, two.upper, strict=True)
     )

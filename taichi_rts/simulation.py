@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time as clock
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import taichi as ti
 
 from taichi_rts import backend as backends
-from taichi_rts.diagnostics import Energy, Tally, measure_energy
+from taichi_rts.diagnostics import Energy, Overhead, Tally, measure_energy
 from taichi_rts.errors import SimulationDivergedError, TimeError
 from taichi_rts.grid import BlockGrid, Geometry
 from taichi_rts.motion import Motion
@@ -37,7 +37,7 @@ class Simulation:
     def __init__(self, scene: Scene, stepper: Stepper | None = None) -> None:
         backend = backends.current()
         self.scene = scene
-        self.stepper: Stepper = stepper if stepper is not None else Regional()
+        self.stepper = stepper if stepper is not None else cast(Stepper, Regional())
         self.backend = backend
         start = sample(scene)
         self.medium = Medium.of(scene, start.mass)
@@ -56,9 +56,7 @@ class Simulation:
         self.walls = Walls(start.wall_positions, start.wall_volumes, geometry, backend) if scene.walls else None
         self.density = SummationDensity(self.particles, self.near, self.grid, self.walls, self.medium, backend)
         terms = [Pressure(self.near), *viscosity_terms(scene, self.medium, self.near)]
-        momentum = MomentumEquation(
-            terms, self.near, self.grid, self.walls, self.medium, scene.acceleration, backend
-        )
+        momentum = MomentumEquation(terms, self.near, self.grid, self.walls, self.medium, scene.acceleration, backend)
         self.motion = Motion(
             self.particles,
             self.near,
@@ -69,6 +67,7 @@ class Simulation:
         )
         self.schedule = self.stepper.schedule(scene, self.particles, self.grid, self.timeline)
 
+        self.overhead = Overhead(self.particles.count)
         self._tally = Tally(self.particles.count, self.schedule.levels)
         self._uncollected = 0
         self._time = 0.0
@@ -82,11 +81,13 @@ class Simulation:
         """Do what is due at the present tick: lines 4-29 of Algorithm 1."""
         now, tick = self.timeline.now, self.timeline.tick
         schedule = self.schedule
-        self.grid.update(self.motion.locate_particles, self.particles.identity, now, tick)  # line 4
-        schedule.select(now, tick)  # lines 5-16
-        self.motion.predict_neighbourhood(schedule.touched, now, tick)  # lines 25-26, where somebody looks
-        self.density.update(schedule.due, schedule.due_count)  # lines 18-21
-        self.motion.advance_due(schedule.due, schedule.due_count, now, tick)  # lines 22-29
+        with self.overhead.shared:
+            self.grid.update(self.motion.locate_particles, self.particles.identity, now, tick)  # line 4
+            schedule.select(now, tick)  # lines 5-16
+            self.motion.predict_neighbourhood(schedule.touched, now, tick)  # lines 25-26, where somebody looks
+        with self.overhead.due:
+            self.density.update(schedule.due, schedule.due_count)  # lines 18-21
+            self.motion.advance_due(schedule.due, schedule.due_count, now, tick)  # lines 22-29
         schedule.observe()
 
     def advance_to(self, time: float) -> None:
@@ -102,7 +103,8 @@ class Simulation:
         began = clock.perf_counter()
         while self.timeline.now + (ticks := self.schedule.next_ticks()) <= target:
             self.timeline.now += ticks
-            self.step()
+            with self.overhead.sampled_step(self.schedule.due_count):
+                self.step()
             self._count_step()
         ti.sync()
         self._tally.wall_seconds += clock.perf_counter() - began
@@ -176,8 +178,16 @@ class Simulation:
 
     @property
     def statistics(self) -> dict[str, Any]:
-        """Work so far: base_steps, particle_updates, wall_seconds, active_fraction, level_fractions and more."""
-        return {**self._tally.statistics(), "stopped_by_domain": int(self.motion.stopped[None])}
+        """Work so far: base_steps, particle_updates, wall_seconds, active_fraction, level_fractions and more.
+
+        `overhead_fraction` is the share of a step in which all are due that everybody pays (grid, regions, prediction),
+        measured on a sample of the steps. `stopped_by_domain` counts centres that a face of the domain had to stop.
+        """
+        return {
+            **self._tally.statistics(),
+            "overhead_fraction": self.overhead.fraction,
+            "stopped_by_domain": int(self.motion.stopped[None]),
+        }
 
     def energy(self) -> Energy:
         """Kinetic, potential and internal energy [J] at `time`."""

@@ -1,5 +1,7 @@
 """Density by summation, and the pass that gives every due particle its density and pressure."""
 
+from typing import Any
+
 import taichi as ti
 
 from taichi_rts.backend import Backend
@@ -29,7 +31,7 @@ class SummationDensity:
         self.particles = particles
         self.near = near
         self.grid = grid
-        self.walls = walls
+        self.walls: Any = walls
         self.has_walls = walls is not None
         self.equation_of_state = medium.equation_of_state
         self.with_rate = particles.has_rho_rate

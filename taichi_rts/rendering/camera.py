@@ -45,9 +45,7 @@ class Camera:
 
     def __post_init__(self):
         if not 1.0 <= self.field_of_view <= 170.0:
-            raise RenderError(
-                f"field_of_view = {self.field_of_view} degrees is outside 1 to 170: 35 suits most scenes"
-            )
+            raise RenderError(f"field_of_view = {self.field_of_view} degrees is outside 1 to 170: 35 suits most scenes")
         if self.orthographic_height is not None and not self.orthographic_height > 0:
             raise RenderError(
                 f"orthographic_height = {self.orthographic_height} m must be above 0: "
@@ -86,15 +84,11 @@ class Camera:
         outward = np.cos(el) * (np.sin(az) * across + np.cos(az) * front) + np.sin(el) * upward
         camera = cls(tuple(centre + outward), tuple(centre), tuple(up), field_of_view)
         half_height = np.tan(np.radians(field_of_view) / 2) * MARGIN
-        for _ in range(
-            6
-        ):  # perspective makes the near side larger: move the box to the middle of the picture
+        for _ in range(6):  # perspective makes the near side larger: move the box to the middle of the picture
             camera, distance = _back_off(camera, corners, outward, half_height, aspect)
             right, above, _ = camera.basis()
             flat = camera.project(corners, 2, 2)[:, :2]
-            middle = (0.5 * (flat.min(axis=0) + flat.max(axis=0)) - 1.0) * np.tan(
-                np.radians(field_of_view) / 2
-            )
+            middle = (0.5 * (flat.min(axis=0) + flat.max(axis=0)) - 1.0) * np.tan(np.radians(field_of_view) / 2)
             target = np.asarray(camera.target) + distance * (middle[0] * right - middle[1] * above)
             camera = replace(camera, eye=tuple(target + distance * outward), target=tuple(target))
         return _back_off(camera, corners, outward, half_height, aspect)[0]

@@ -95,9 +95,7 @@ class LiveWindow:
 
     def __init__(self, width: int = 1280, height: int = 720, title: str = "taichi_rts"):
         """Open the window; without a display or without Vulkan this is a RenderError."""
-        if sys.platform.startswith("linux") and not (
-            os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-        ):
+        if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
             raise RenderError(
                 "a window needs a display, but neither DISPLAY nor WAYLAND_DISPLAY is set: "
                 f"run from a desktop session, or {WAY_OUT}"

@@ -62,9 +62,7 @@ def draw_legend(image: np.ndarray, title: str, entries, lines=(), position: str 
             canvas.rectangle((start, top + size // 5, end, top + size - size // 5), fill=FAINT)
             filled = start + round((end - start) * float(np.clip(share, 0, 1)))
             if filled > start:
-                canvas.rectangle(
-                    (start, top + size // 5, filled, top + size - size // 5), fill=_bytes(colour)
-                )
+                canvas.rectangle((start, top + size // 5, filled, top + size - size // 5), fill=_bytes(colour))
             number = f"{100 * share:.1f} %"
             draw_text(canvas, (x + width - pad - text_width(number, size), top), number, size, INK)
         top += step
@@ -123,8 +121,7 @@ def _panels(images, captions, axis: int) -> np.ndarray:
     captions = list(captions) if captions is not None else [""] * len(images)
     if len(images) == 0 or len(captions) != len(images):
         raise RenderError(
-            f"{len(images)} pictures with {len(captions)} captions: give at least one picture, "
-            "and a caption for each"
+            f"{len(images)} pictures with {len(captions)} captions: give at least one picture, and a caption for each"
         )
     other = 1 - axis
     sides = {image.shape[other] for image in images}

@@ -259,9 +259,7 @@ def shade_picture(
                     gap = ti.bit_cast(depth[j * width + i], ti.f32) - z
                     behind = ti.max(behind, ti.min(gap / (ti.f32(8.0) * radius) - ti.f32(0.25), one))
                 tint = tints[number]
-                glow = ti.f32(0.50) * above * air[1] + ti.f32(0.95) * direct * (
-                    ti.f32(0.5) + ti.f32(0.5) * air[1]
-                )
+                glow = ti.f32(0.50) * above * air[1] + ti.f32(0.95) * direct * (ti.f32(0.5) + ti.f32(0.5) * air[1])
                 colour = tint * glow * (one - ti.f32(0.35) * behind)
                 colour += ti.f32(0.10) * shine * air[2] * air[1]
             else:

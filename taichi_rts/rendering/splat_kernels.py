@@ -25,9 +25,7 @@ SMALLEST = 0.71  # [pixels] radius below which a sphere could fall between pixel
 
 
 @ti.kernel
-def upload_points(
-    positions: Table, colours: Table, linear: Floats, count: ti.i32, points: Vectors3, tints: Vectors3
-):
+def upload_points(positions: Table, colours: Table, linear: Floats, count: ti.i32, points: Vectors3, tints: Vectors3):
     """Copy the frame's arrays to the device; colours go from sRGB to linear light by table."""
     steps = linear.shape[0] - 1
     for i in range(count):
@@ -78,9 +76,7 @@ def clear_buffer(buffer: Ints, value: ti.i32):
 
 
 @ti.func
-def splat(
-    sprite, number, lens, width, height, depth: ti.template(), nearest: ti.template(), naming: ti.template()
-):
+def splat(sprite, number, lens, width, height, depth: ti.template(), nearest: ti.template(), naming: ti.template()):
     """Visit the pixels of one sphere and enter its depth, or its number where it is the nearest."""
     half = ti.f32(0.5)
     zero = ti.f32(0.0)

@@ -32,13 +32,10 @@ def checked_arrays(positions, colours, radius: float) -> tuple[np.ndarray, np.nd
     positions = np.asarray(positions, np.float32)
     colours = np.asarray(colours, np.float32)
     if positions.ndim != 2 or positions.shape[1] not in (2, 3):
-        raise RenderError(
-            f"positions have shape {positions.shape}, must be (N, 2) or (N, 3): pass one row a particle"
-        )
+        raise RenderError(f"positions have shape {positions.shape}, must be (N, 2) or (N, 3): pass one row a particle")
     if colours.shape != (len(positions), 3):
         raise RenderError(
-            f"colours have shape {colours.shape}, must be ({len(positions)}, 3): "
-            "pass one RGB row for each position"
+            f"colours have shape {colours.shape}, must be ({len(positions)}, 3): pass one RGB row for each position"
         )
     if not radius > 0:
         raise RenderError(f"radius = {radius} m must be above 0: half the particle spacing is a good choice")
@@ -121,9 +118,7 @@ class Splatter:
         clear(self._lines, 0)
         if self.shadows and not flat and count:
             self._project(count, radius, light_eye, light_basis, light_lens)
-            splat_kernels.splat_depths(
-                self._sprites, count, light_lens, SHADOW_SIZE, SHADOW_SIZE, self._shadow_depth
-            )
+            splat_kernels.splat_depths(self._sprites, count, light_lens, SHADOW_SIZE, SHADOW_SIZE, self._shadow_depth)
         if count:
             self._project(count, radius, eye, basis, lens)
             splat_kernels.splat_depths(self._sprites, count, lens, width, height, self._depth)
@@ -131,9 +126,7 @@ class Splatter:
         if outline is not None:
             self._trace(outline, camera, lens, radius)
         extent = float(np.linalg.norm(box[1] - box[0]))
-        ground, ground_reach = _ground(
-            camera, basis, box, extent, self.shadows and outline is not None and not flat
-        )
+        ground, ground_reach = _ground(camera, basis, box, extent, self.shadows and outline is not None and not flat)
         reach = max(5 * radius, 0.03 * extent)
         texel = 1.0 / light_lens[0]
         softness = max(0.012 * extent / texel, 1.5)

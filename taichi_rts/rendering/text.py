@@ -35,9 +35,7 @@ def _runs(text: str, size: int):
         text = text.replace(sign, spelled)
     piece, k = "", 0
     while k < len(text):
-        subscript = (
-            text[k] == "_" and k > 0 and text[k - 1] != " " and k + 1 < len(text) and text[k + 1].isalnum()
-        )
+        subscript = text[k] == "_" and k > 0 and text[k - 1] != " " and k + 1 < len(text) and text[k + 1].isalnum()
         if not subscript and text[k] != "Δ":
             piece += text[k]
             k += 1
@@ -53,9 +51,7 @@ def _runs(text: str, size: int):
 
 def text_width(text: str, size: int) -> float:
     """Return the width of a text [pixels]."""
-    return sum(
-        0.74 * run if piece == "Δ" else _font(run).getlength(piece) for piece, run, _ in _runs(text, size)
-    )
+    return sum(0.74 * run if piece == "Δ" else _font(run).getlength(piece) for piece, run, _ in _runs(text, size))
 
 
 def draw_text(canvas: ImageDraw.ImageDraw, place, text: str, size: int, fill) -> None:

@@ -74,9 +74,7 @@ def test_number_of_particles_may_change(splatter):
     for count in (2000, 1, 500, 0):
         fresh[count] = Splatter(WIDTH, HEIGHT).draw(positions[:count], colours[:count], 0.1, FRONT)
     for count in (1, 500, 2000, 0, 500):
-        assert np.array_equal(splatter.draw(positions[:count], colours[:count], 0.1, FRONT), fresh[count]), (
-            count
-        )
+        assert np.array_equal(splatter.draw(positions[:count], colours[:count], 0.1, FRONT), fresh[count]), count
     assert not covered(fresh[0]).any()
 
 
@@ -95,9 +93,7 @@ def test_colour_survives_the_light(splatter):
 
 
 def test_background(taichi_cpu):
-    picture = Splatter(32, 24, background=(0.2, 0.4, 0.6)).draw(
-        np.zeros((0, 3)), np.zeros((0, 3)), 1.0, FRONT
-    )
+    picture = Splatter(32, 24, background=(0.2, 0.4, 0.6)).draw(np.zeros((0, 3)), np.zeros((0, 3)), 1.0, FRONT)
     assert np.all(picture == (51, 102, 153))
 
 

@@ -1,0 +1,12 @@
+"""Water at rest, 0.5 m deep: whatever moves is error.
+
+Takes every option of `taichi-rts run`, e.g. --arch cuda --particles 300k --stepper uniform.
+"""
+
+from taichi_rts.cli import run_demo
+
+SCENE = "still_pool"
+EXPORT_FPS = 60.0  # frames per second of physical time
+
+if __name__ == "__main__":
+    run_demo(SCENE, export_fps=EXPORT_FPS)

@@ -1,0 +1,186 @@
+"""The command line: `taichi-rts run|scenes|info`."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union
+
+import tyro
+
+import taichi_rts as rts
+from taichi_rts import backend, report
+from taichi_rts.errors import Error, OutputError
+from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
+from taichi_rts.rendering.painter import Mode, PictureOptions
+
+STEPPERS: dict[str, Any] = {kind.name: kind for kind in (rts.Uniform, rts.Regional)}
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """Run a scene and save its frames.
+
+    Writes OUTPUT_DIR/frames/000000.png ... at exact physical times, and OUTPUT_DIR/run.json. Exit codes: 0 done, 2 wrong
+    input or nothing to run on.
+    """
+
+    scene: tyro.conf.Positional[str] = "double_dam_break"
+    """Name of a built-in scene (see `taichi-rts scenes`) or path of a TOML file."""
+    arch: Literal["auto", "cuda", "vulkan", "cpu"] = "auto"
+    """Where kernels run; auto takes the first of cuda, vulkan, cpu that is there. A named one never falls back."""
+    precision: Literal["f32", "f64"] = "f32"
+    """Floating-point precision."""
+    stepper: Literal["uniform", "regional"] = "regional"
+    """One step for all, or a step for each block."""
+    preset: Literal["paper"] | None = None
+    """Regional: the paper's setting (courant 0.4, 3 levels, Eq. 1 not enforced beyond level 1)."""
+    courant: float | None = None
+    """Courant number dt c_s / r of the base step."""
+    levels: int | None = None
+    """Regional: largest number of base steps in a step."""
+    alpha: float | None = None
+    """Regional: alpha of Eq. 3."""
+    lambda_f: float | None = None
+    """Regional, adaptive uniform: factor of the force limit, Eq. 2."""
+    strict_cfl: bool | None = None
+    """Regional: divide the base step by the number of levels, so that the longest step respects Eq. 1."""
+    grading: bool | None = None
+    """Regional: let levels of neighbouring blocks differ by at most one."""
+    corrector: bool | None = None
+    """Regional: Serna's corrector. Without it the method blows up."""
+    inactive_density: Literal["stale", "extrapolated"] | None = None
+    """Regional: density of particles that are not due."""
+    integrator: Literal["serna", "symplectic_euler"] | None = None
+    """Uniform: how to integrate."""
+    adaptive: bool | None = None
+    """Uniform: follow the largest speed and acceleration."""
+    spacing: float | None = None
+    """Initial particle spacing [m]."""
+    particles: str | None = None
+    """Number of fluid particles instead of a spacing, e.g. 30k or 1.5M."""
+    sound_speed: float | None = None
+    """Sound speed [m/s]; by default ten times the largest speed the scene suggests."""
+    end_time: float | None = None
+    """Physical time to run to [s]; by default the scene's own."""
+    export_fps: float = 60.0
+    """Frames per second of physical time."""
+    output_dir: Path | None = None
+    """Folder for the results; by default out/SCENE."""
+    overwrite: bool = False
+    """Replace an earlier run's frames, video and run.json in the output folder."""
+    renderer: Literal["splatter", "ggui"] = "splatter"
+    """splatter needs no Vulkan and no display; ggui is Taichi's own."""
+    width: int = 1280
+    """Width of a frame [pixels]."""
+    height: int = 720
+    """Height of a frame [pixels]."""
+    colour_by: Mode = "level"
+    """What colours show."""
+    palette: Literal["default", "paper"] = "default"
+    """Colours of levels: safe for colour-blind readers, or the paper's red, green, blue."""
+    azimuth: float | None = None
+    """Camera angle around the vertical [degrees]."""
+    elevation: float | None = None
+    """Camera angle above the ground [degrees]."""
+    panels: Literal["figure3", "ablation"] | None = None
+    """Several panels in a frame: the paper's Figure 3 or 2, instead of --stepper."""
+    video: bool = False
+    """Also write video.mp4 (needs the extra `video`)."""
+    gui: bool = False
+    """Watch in a window instead of saving frames (needs Vulkan and a display)."""
+
+    def __call__(self) -> None:
+        """Run it."""
+        changes = {key: getattr(self, key) for key in ("spacing", "sound_speed", "end_time")}
+        changes = {key: value for key, value in changes.items() if value is not None}
+        scene = rts.load_scene(self.scene, particles=self.particles, **changes)
+        layout = self.panels or DEFAULT_LAYOUT.get(scene.name)
+        stepper = self.make_stepper()
+        panels = LAYOUTS[layout] if layout else [Panel("", stepper)]
+        options = PictureOptions(
+            **{f.name: getattr(self, f.name) for f in dataclasses.fields(PictureOptions) if hasattr(self, f.name)}
+        )
+        if self.gui:
+            from taichi_rts.rendering.live import watch  # only here, because it needs Vulkan and a display
+
+            watch(scene, stepper, options, lambda: rts.init(self.arch, self.precision))
+            return
+        from taichi_rts.output.recorder import Recorder, Recording, frame_times
+
+        folder = self.output_dir if self.output_dir is not None else Path("out") / scene.name
+        recording = Recording(folder, self.export_fps, self.video, self.overwrite)
+        frames = len(frame_times(scene.end_time, self.export_fps))
+        check_size(self.width, self.height)
+        device = rts.init(self.arch, self.precision)
+        recorder = Recorder(scene, panels, options, recording)
+        with report.progress(recorder.runs, scene.end_time, device) as on_frame:
+            recorder.record(scene.end_time, on_frame)
+        for stepper, sim in recorder.runs.items():
+            report.print_table(sim, recorder.initial_energy[stepper])
+        report.print_folder(folder, frames)
+
+    def make_stepper(self) -> Any:
+        """Build the stepper from the options that were given; raises `StepperError` if one does not belong to it."""
+        kind = STEPPERS[self.stepper]
+        own = set(kind.__dataclass_fields__)
+        possible = {key for other in STEPPERS.values() for key in other.__dataclass_fields__} & set(vars(self))
+        given = {key: getattr(self, key) for key in sorted(possible) if getattr(self, key) is not None}
+        if foreign := sorted(set(given) - own):
+            names = ", ".join(f"--{key.replace('_', '-')}" for key in foreign)
+            raise rts.StepperError(f"{names} does not belong to the {self.stepper} stepper; leave it out")
+        return kind(**given)
+
+
+@dataclasses.dataclass(frozen=True)
+class Scenes:
+    """List the built-in scenes."""
+
+    def __call__(self) -> None:
+        """List them."""
+        report.print_scenes([rts.load_scene(name) for name in rts.scene_names()])
+
+
+@dataclasses.dataclass(frozen=True)
+class Info:
+    """Say what is installed and which arches can be used here."""
+
+    def __call__(self) -> None:
+        """Say it."""
+        report.print_info(backend.available())
+
+
+Command = Union[
+    Annotated[Run, tyro.conf.subcommand("run")],
+    Annotated[Scenes, tyro.conf.subcommand("scenes")],
+    Annotated[Info, tyro.conf.subcommand("info")],
+]
+
+
+def check_size(width: int, height: int) -> None:
+    """Raise `OutputError` for a picture that cannot be made or looked at."""
+    if not (64 <= width <= 8192 and 64 <= height <= 8192):
+        raise OutputError(f"picture of {width} x {height} pixels: both sides must be 64 to 8192; try 1280 and 720")
+
+
+def main(args: list[str] | None = None) -> None:
+    """Entry point of `taichi-rts`."""
+    _execute(tyro.cli(Command, prog="taichi-rts", description=rts.__doc__, args=args))  # type: ignore[arg-type]
+
+
+def run_demo(scene: str, **defaults: Any) -> None:
+    """Run a demo: `taichi-rts run SCENE` with other defaults; takes the same options."""
+    default = Run(scene=scene, **{"output_dir": Path("out") / scene} | defaults)
+    _execute(tyro.cli(Run, default=default))
+
+
+def _execute(command: Any) -> None:
+    try:
+        command()
+    except Error as error:
+        print(f"taichi-rts: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+    except KeyboardInterrupt:
+        print("taichi-rts: interrupted; frames already written are complete", file=sys.stderr)
+        raise SystemExit(130) from None

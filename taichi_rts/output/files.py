@@ -1,0 +1,60 @@
+"""Writing files so that nothing is ever half-written: to a temporary name first, then renamed."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+from taichi_rts.errors import OutputError
+
+ARTEFACTS = ("frames", "run.json", "video.mp4")  # what a run writes, and all that --overwrite removes
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write `data` to `path` in one go; raises `OutputError`, and then leaves what was there as it was."""
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with temporary.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise OutputError(
+            f"{path} cannot be written: {error.strerror}; free some space or choose another --output-dir"
+        ) from None
+
+
+def write_json(path: Path, data: Any) -> None:
+    """Write `data` as indented JSON in one go."""
+    write_bytes(path, (json.dumps(data, indent=2, allow_nan=False) + "\n").encode())
+
+
+def prepare_folder(folder: Path, overwrite: bool) -> None:
+    """Make `folder` ready for a run: new, empty, or with an earlier run's files removed if `overwrite`.
+
+    Raises `OutputError` if it holds an earlier run and `overwrite` is off, is a file, or cannot be written to. Files that
+    no run wrote are never touched.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"{folder} is a file, and a folder is needed; choose another --output-dir")
+    found = [name for name in ARTEFACTS if (folder / name).exists()]
+    if found and not overwrite:
+        raise OutputError(
+            f"{folder} already holds a run ({', '.join(found)}); choose another --output-dir, or give --overwrite"
+        )
+    ancestor = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not os.access(ancestor, os.W_OK | os.X_OK):
+        raise OutputError(f"{folder} cannot be written: no permission in {ancestor}; choose another --output-dir")
+    for name in found:
+        target = folder / name
+        if target.is_dir():
+            shutil.rmtree(target)
+        else:
+            target.unlink()
+    folder.mkdir(parents=True, exist_ok=True)

@@ -1,0 +1,37 @@
+"""Pictures of several panels: the same scene by different steppers or in different views, at the same physical time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from taichi_rts.stepping.regional import Regional
+from taichi_rts.stepping.uniform import Uniform
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One panel: what it says above it, who steps, and what it changes of the picture's options."""
+
+    caption: str
+    stepper: Any
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+PAPER = Regional(preset="paper")
+
+LAYOUTS: dict[str, list[Panel]] = {
+    "figure3": [
+        Panel("Regional time stepping, coloured by region", PAPER),
+        Panel("The same from another viewpoint", PAPER, {"colour_by": "plain", "azimuth": 35.0}),
+        Panel("Standard method at the base step", Uniform(), {"colour_by": "plain", "azimuth": 35.0}),
+    ],
+    "ablation": [
+        Panel("Without the corrector", Regional(preset="paper", corrector=False)),
+        Panel("With the corrector", PAPER),
+    ],
+}
+"""`figure3` and `ablation` are Figures 3 and 2 of Goswami & Batty 2014."""
+
+DEFAULT_LAYOUT = {"serna_ablation": "ablation"}
+"""Scenes that are about a comparison, and the layout that shows it."""

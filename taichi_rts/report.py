@@ -1,0 +1,102 @@
+"""What a user sees in the terminal: a progress bar while it runs, tables when it is done."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from taichi_rts.backend import Backend
+from taichi_rts.diagnostics import Energy, speedup_bound
+from taichi_rts.scene import Scene
+from taichi_rts.simulation import Simulation
+
+console = Console()
+
+
+@contextmanager
+def progress(runs: Mapping[Any, Simulation], end_time: float, device: Backend) -> Iterator[Callable[[float], None]]:
+    """Show a bar with physical time, active fraction, updates/s and time left; yields what to call after each frame."""
+    first = next(iter(runs.values()))
+    columns = [
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("t = {task.completed:.3f} / {task.total:g} s  {task.fields[work]}"),
+        TimeRemainingColumn(),
+    ]
+    with Progress(*columns, console=console) as bar:
+        label = f"{first.scene.name}: {first.count:,} particles on {device.arch}"
+        task = bar.add_task(label, total=end_time, work="")
+
+        def on_frame(time: float) -> None:
+            statistics = [sim.statistics for sim in runs.values()]
+            updates = sum(s["particle_updates"] for s in statistics)
+            seconds = sum(s["wall_seconds"] for s in statistics)
+            active = statistics[0]["active_fraction"]
+            bar.update(task, completed=time, work=f"active {active:.0%}  {rate(updates, seconds)}")
+
+        yield on_frame
+
+
+def rate(updates: float, seconds: float) -> str:
+    """Updates per second as text."""
+    return f"{updates / seconds / 1e6:.2f} M updates/s" if seconds > 0.0 else "- updates/s"
+
+
+def print_table(sim: Simulation, initial_energy: Energy) -> None:
+    """Print shares per level, active fraction, updates/s, the bound of the speed-up and the energy drift."""
+    statistics = sim.statistics
+    levels = Table(title=f"{sim.scene.name}, {sim.stepper.name} steps", title_justify="left")
+    for heading in ("level", "step [ms]", "share of particles", "share of updates"):
+        levels.add_column(heading, justify="right")
+    shares = zip(statistics["level_fractions"], statistics["update_fractions"], strict=True)
+    for n, (particles, updates) in enumerate(shares, start=1):
+        levels.add_row(str(n), f"{1e3 * n * sim.base_step:.3f}", f"{particles:.2%}", f"{updates:.2%}")
+    console.print(levels)
+
+    energy = sim.energy()
+    drift = (energy.total - initial_energy.total) / abs(initial_energy.total) if initial_energy.total else 0.0
+    facts = Table(show_header=False, box=None)
+    facts.add_row("active fraction", f"{statistics['active_fraction']:.3f}")
+    facts.add_row("base steps", f"{statistics['base_steps']:,} in {statistics['wall_seconds']:.2f} s")
+    facts.add_row("updates", rate(statistics["particle_updates"], statistics["wall_seconds"]))
+    overhead = statistics["overhead_fraction"]
+    if overhead is not None:
+        bound = speedup_bound(statistics["active_fraction"], overhead)
+        facts.add_row("paid by all (ε)", f"{overhead:.1%} of a full step")
+        facts.add_row("speed-up bound", f"{bound:.2f} over uniform steps of the base step")
+    facts.add_row("energy drift", f"{drift:+.2%} of {initial_energy.total:.4g} J")
+    facts.add_row("stopped by the box", f"{statistics['stopped_by_domain']} centres")
+    console.print(facts)
+
+
+def print_folder(folder: Path, frames: int) -> None:
+    """Say where the results are."""
+    console.print(f"{frames} frames in {folder / 'frames'}, facts in {folder / 'run.json'}", soft_wrap=True)
+
+
+def print_scenes(scenes: list[Scene]) -> None:
+    """Print a table of scenes."""
+    table = Table("name", "dim", "particles", "end [s]", "what it is")
+    for scene in scenes:
+        count = sum(block.volume for block in scene.fluids) / scene.spacing**scene.dim
+        table.add_row(scene.name, str(scene.dim), f"{count:,.0f}", f"{scene.end_time:g}", scene.description)
+    console.print(table)
+
+
+def print_info(support: Mapping[str, str]) -> None:
+    """Print versions and arches."""
+    table = Table("what", "here", show_header=False)
+    for name in ("taichi_rts", "taichi", "numpy"):
+        table.add_row(name, version(name))
+    table.add_row("python", platform.python_version())
+    for arch, state in support.items():
+        table.add_row(f"arch {arch}", state)
+    console.print(table)
