@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Literal, Union
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -151,11 +151,11 @@ class Info:
         report.print_info(backend.available())
 
 
-Command = Union[
-    Annotated[Run, tyro.conf.subcommand("run")],
-    Annotated[Scenes, tyro.conf.subcommand("scenes")],
-    Annotated[Info, tyro.conf.subcommand("info")],
-]
+Command = (
+    Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Scenes, tyro.conf.subcommand("scenes")]
+    | Annotated[Info, tyro.conf.subcommand("info")]
+)
 
 
 def check_size(width: int, height: int) -> None:

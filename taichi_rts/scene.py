@@ -76,7 +76,7 @@ class Block:
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class View:
-    """Where pictures are taken from: `azimuth` and `elevation` [degrees] around the domain box, or an `eye` and a `target` [m]."""
+    """Where pictures are taken from: `azimuth` and `elevation` [degrees] around the domain, or `eye` and `target` [m]."""
 
     azimuth: float = -35.0
     elevation: Annotated[float, Field(ge=-90, le=90)] = 20.0
