@@ -6,7 +6,15 @@ import taichi as ti
 
 from taichi_rts.grid import BlockGrid
 from taichi_rts.particles import Neighbourhood, Particles
+from taichi_rts.physics.medium import Medium
 from taichi_rts.physics.momentum import MomentumEquation
+
+RUNAWAY_SPEED = 2.0
+RUNAWAY_ACCELERATION = 4.0
+"""Largest speed over c_s and acceleration over c_s^2/r, far beyond what weakly compressible flow can do.
+
+They bound the damage once a run has blown up: unlimited, particles pile up in a few cells and a step takes minutes.
+"""
 
 
 @ti.data_oriented
@@ -20,18 +28,22 @@ class Motion:
         grid: BlockGrid,
         momentum: MomentumEquation,
         integrator: Any,
-        equation_of_state: Any,
+        medium: Medium,
     ) -> None:
         self.particles = particles
         self.near = near
         self.grid = grid
         self.momentum = momentum
         self.integrator = integrator
-        self.equation_of_state = equation_of_state
+        self.equation_of_state = medium.equation_of_state
+        self.largest_speed = RUNAWAY_SPEED * medium.sound_speed
+        self.largest_acceleration = RUNAWAY_ACCELERATION * medium.sound_speed**2 / medium.support
         self.geometry = grid.geometry
         self.stopped = ti.field(ti.i32, ())
         """How often a face of the domain stopped a centre that wall particles had let through."""
         self.not_finite = ti.field(ti.i32, ())
+        self.runaways = ti.field(ti.i32, ())
+        """How often a speed or an acceleration had to be limited: more than never means that the run has blown up."""
 
     @ti.func
     def elapsed(self, i, now, tick):
@@ -43,6 +55,16 @@ class Motion:
         """Predicted position [m] of particle `i`, `dt` [s] after its last evaluation, kept inside the domain."""
         p = self.particles
         return self.geometry.clamp(self.integrator.predict_position(p.x[i], p.v[i], p.a[i], dt))
+
+    @ti.func
+    def limit(self, vector, largest: ti.template()):
+        """Shorten `vector` to length `largest`, and count it."""
+        limited = vector
+        length2 = vector.norm_sqr()
+        if length2 > largest * largest:
+            limited = vector * (largest / ti.sqrt(length2))
+            self.runaways[None] += 1
+        return limited
 
     @ti.kernel
     def locate_particles(self, now: ti.i32, tick: float):
@@ -77,6 +99,7 @@ class Motion:
             a_new = self.momentum.acceleration(k)
             x = self.integrator.correct_position(self.near.x[k], a, a_new, dt)
             v = self.integrator.correct_velocity(self.particles.v[i], a, a_new, dt)
+            v, a_new = self.limit(v, self.largest_speed), self.limit(a_new, self.largest_acceleration)
             finite = True
             for d in ti.static(range(self.particles.dim)):
                 finite = finite and not (ti.math.isnan(x[d]) or ti.math.isinf(x[d]) or ti.math.isnan(a_new[d]))

@@ -74,6 +74,8 @@ def print_table(sim: Simulation, initial_energy: Energy) -> None:
         facts.add_row("speed-up bound", f"{bound:.2f} over uniform steps of the base step")
     facts.add_row("energy drift", f"{drift:+.2%} of {initial_energy.total:.4g} J")
     facts.add_row("stopped by the box", f"{statistics['stopped_by_domain']} centres")
+    if statistics["runaways"]:
+        facts.add_row("[bold red]blown up[/]", f"limited {statistics['runaways']:,} times; use a smaller --courant")
     console.print(facts)
 
 

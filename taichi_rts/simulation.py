@@ -63,7 +63,7 @@ class Simulation:
             self.grid,
             momentum,
             self.stepper.make_integrator(),
-            self.medium.equation_of_state,
+            self.medium,
         )
         self.schedule = self.stepper.schedule(scene, self.particles, self.grid, self.timeline)
 
@@ -181,12 +181,14 @@ class Simulation:
         """Work so far: base_steps, particle_updates, wall_seconds, active_fraction, level_fractions and more.
 
         `overhead_fraction` is the share of a step in which all are due that everybody pays (grid, regions, prediction),
-        measured on a sample of the steps. `stopped_by_domain` counts centres that a face of the domain had to stop.
+        measured on a sample of the steps. `stopped_by_domain` counts centres that a face of the domain had to stop, `runaways`
+        speeds and accelerations that had to be limited because the run has blown up.
         """
         return {
             **self._tally.statistics(),
             "overhead_fraction": self.overhead.fraction,
             "stopped_by_domain": int(self.motion.stopped[None]),
+            "runaways": int(self.motion.runaways[None]),
         }
 
     def energy(self) -> Energy:

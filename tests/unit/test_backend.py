@@ -44,7 +44,7 @@ def test_precision_reaches_taichi(start_taichi, precision):
         assert backend.current() is started
         assert started.dtype is getattr(ti, precision)
         assert started.numpy_dtype.__name__ == {"f32": "float32", "f64": "float64"}[precision]
-        assert ti.field(float, ()).dtype is started.dtype
+        assert ti.field(float, ()).dtype == started.dtype
 
 
 def test_simulation_before_init_says_what_to_call(monkeypatch):
@@ -57,7 +57,7 @@ def test_importing_starts_nothing():
     code = (
         "import taichi_rts as rts; import taichi as ti; from taichi_rts import backend\n"
         "rts.load_scene('dam_break'); rts.Regional()\n"
-        "assert ti.lang.impl.get_runtime()._prog is None and backend._current is None"
+        "assert ti.lang.impl.get_runtime().prog is None and backend._current is None"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stderr

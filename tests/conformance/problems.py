@@ -1,0 +1,91 @@
+"""Small problems that share a tank, a number of particles and a sound speed, so that they share compiled kernels."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+import taichi_rts as rts
+
+FALL_FROM, FALL_VELOCITY = (0.3, 0.16), (0.4, 0.5)
+
+
+@dataclass(frozen=True)
+class Problem:
+    scene: rts.Scene
+    end_time: float
+    pieces: int = 7
+
+
+def tank_2d(*fluids, **changes):
+    fields = {"domain": rts.Box((0, 0), (1, 1)), "fluids": fluids, "spacing": 0.04, "sound_speed": 40.0}
+    return rts.Scene(**(fields | changes))
+
+
+def tank_3d(*fluids):
+    return rts.Scene(domain=rts.Box((0, 0, 0), (0.6, 0.6, 0.3)), fluids=fluids, spacing=0.06, sound_speed=30.0)
+
+
+PROBLEMS = {
+    "dam_break_2d": Problem(tank_2d(rts.Block((0, 0), (0.4, 0.8))), 0.25),
+    "dam_break_3d": Problem(tank_3d(rts.Block((0, 0, 0), (0.24, 0.48, 0.3))), 0.12),
+    "still_pool": Problem(tank_2d(rts.Block((0, 0), (1, 0.32))), 0.25),
+    "free_fall": Problem(tank_2d(rts.Block(FALL_FROM, (0.7, 0.96), velocity=FALL_VELOCITY)), 0.18),
+    "head_on_blobs": Problem(
+        tank_2d(
+            rts.Block((0.08, 0.3), (0.48, 0.7), velocity=(3, 0)),
+            rts.Block((0.52, 0.3), (0.92, 0.7), velocity=(-3, 0)),
+            gravity=(0, 0),
+        ),
+        0.08,
+    ),
+}
+
+STEPPERS = {
+    "uniform_serna": rts.Uniform(),
+    "uniform_symplectic_euler": rts.Uniform(integrator="symplectic_euler"),
+    "uniform_adaptive": rts.Uniform(adaptive=True),
+    "regional": rts.Regional(),
+    "regional_paper": rts.Regional(preset="paper"),
+    "regional_graded": rts.Regional(levels=5, grading=True, inactive_density="extrapolated"),
+}
+
+
+@dataclass
+class Record:
+    problem: Problem
+    base_step: float
+    times: list = field(default_factory=list)
+    states: list = field(default_factory=list)
+    energies: list = field(default_factory=list)
+    momenta: list = field(default_factory=list)
+    statistics: dict = field(default_factory=dict)
+
+
+def record(problem, stepper):
+    """Run a problem in pieces that end at odd times, and keep all that can be seen from outside."""
+    sim = rts.Simulation(problem.scene, stepper)
+    seen = Record(problem, sim.base_step)
+    for time in np.linspace(0, problem.end_time, problem.pieces + 1):
+        sim.advance_to(time)
+        seen.times.append((time, sim.time))
+        seen.states.append(sim.state())
+        seen.energies.append(sim.energy().total)
+        seen.momenta.append(sim.momentum())
+    seen.statistics = sim.statistics
+    return seen
+
+
+def blocks_with_levels(scene, x, levels):
+    """Level of each block that holds particles; those that stand too close to a face to say which are left out."""
+    place = (x - np.array(scene.domain.lower)) / scene.support
+    clear = (np.abs(place - np.round(place)) > 1e-3).all(axis=1)
+    found = {}
+    for block, level in zip(map(tuple, np.floor(place[clear]).astype(int)), levels[clear], strict=True):
+        found.setdefault(block, set()).add(int(level))
+    return found
+
+
+def around(block, found):
+    offsets = np.ndindex(*[3] * len(block))
+    places = (tuple(b + o - 1 for b, o in zip(block, offset, strict=True)) for offset in offsets)
+    return [place for place in places if place in found]

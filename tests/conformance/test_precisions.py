@@ -1,0 +1,36 @@
+import numpy as np
+import pytest
+from problems import PROBLEMS
+
+import taichi_rts as rts
+
+SCENE, STEPPER, TIME = PROBLEMS["dam_break_3d"].scene, rts.Regional(), 0.03
+
+
+def run():
+    sim = rts.Simulation(SCENE, STEPPER)
+    sim.advance_to(TIME)
+    assert sim.statistics["base_steps"] >= 15
+    return sim.state()
+
+
+def assert_agree(one, two):
+    for a, b in zip(one[:3], two[:3], strict=True):  # positions, velocities, densities
+        assert np.abs(a - b).max() <= 1e-4 * np.abs(b).max()
+    assert (one[3] != two[3]).mean() < 0.05
+
+
+@pytest.fixture(scope="module")
+def single(start_taichi):
+    with start_taichi("cpu", "f32"):
+        return run()
+
+
+def test_single_and_double_precision_agree(single, taichi_cpu_f64):
+    double = run()
+    assert (single[0].dtype, double[0].dtype) == (np.float32, np.float64)
+    assert_agree(single, double)
+
+
+def test_vulkan_and_cpu_agree(single, taichi_vulkan):
+    assert_agree(run(), single)

@@ -1,0 +1,124 @@
+import numpy as np
+import pytest
+from problems import FALL_VELOCITY, PROBLEMS, STEPPERS, around, blocks_with_levels, record
+
+import taichi_rts as rts
+
+every_problem = pytest.mark.parametrize("name", PROBLEMS)
+
+
+@pytest.fixture(scope="module", params=STEPPERS)
+def stepper(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def runs(start_taichi, stepper):
+    with start_taichi("cpu", "f64"):
+        return {name: record(problem, STEPPERS[stepper]) for name, problem in PROBLEMS.items()}
+
+
+@every_problem
+def test_energy_is_never_gained(runs, name):
+    energies = np.array(runs[name].energies)
+    assert energies.max() <= 1.01 * energies[0]
+    assert energies.min() > 0
+
+
+@every_problem
+def test_no_particle_leaves_the_domain(runs, name):
+    domain = PROBLEMS[name].scene.domain
+    for x, v, rho, level in runs[name].states:
+        assert (x >= domain.lower).all()
+        assert (x <= domain.upper).all()
+        assert np.isfinite(v).all()
+        assert (rho > 0).all()
+        assert (level >= 1).all()
+
+
+@every_problem
+def test_time_is_exactly_what_was_asked_for(runs, name):
+    assert all(asked == reached for asked, reached in runs[name].times)
+
+
+@every_problem
+def test_work_is_counted(runs, stepper, name):
+    run, counts = runs[name], runs[name].statistics
+    levels = STEPPERS[stepper].resolved("levels") if isinstance(STEPPERS[stepper], rts.Regional) else 1
+    assert len(counts["level_fractions"]) == levels
+    assert sum(counts["level_fractions"]) == pytest.approx(1.0, abs=1e-12)
+    particles = len(run.states[0][0])
+    assert counts["particle_updates"] == round(counts["active_fraction"] * counts["base_steps"] * particles)
+    fewest = int(run.problem.end_time / run.base_step)
+    assert counts["base_steps"] == fewest or (stepper == "uniform_adaptive" and counts["base_steps"] >= fewest)
+    assert counts["active_fraction"] == 1.0 if levels == 1 else counts["active_fraction"] <= 1.0
+
+
+def test_free_fall_is_exact_to_rounding(runs):
+    run = runs["free_fall"]
+    x0 = run.states[0][0]
+    velocity, gravity = np.array(FALL_VELOCITY), np.array([0, -9.81])
+    for (t, _), (x, v, _, _) in zip(run.times, run.states, strict=True):
+        np.testing.assert_allclose(x, x0 + velocity * t + 0.5 * gravity * t**2, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(v, np.broadcast_to(velocity + gravity * t, v.shape), rtol=0, atol=1e-10)
+
+
+def test_still_pool_stays_still(runs):
+    x, v, rho, _ = runs["still_pool"].states[-1]
+    assert np.sqrt((v**2).sum(axis=1).mean()) < 0.05 * np.sqrt(9.81 * 0.32)
+    assert abs(x[:, 1].max() + 0.02 - 0.32) < 0.04 * 0.32
+    assert rho.max() < 1.03 * 1000
+
+
+def test_momentum_of_a_head_on_collision(runs, stepper):
+    run = runs["head_on_blobs"]
+    one_side = run.problem.scene.rest_density * 0.4 * 0.4 * 3.0
+    drift = np.abs(run.momenta[-1]).max() / one_side
+    assert drift < (1e-12 if stepper.startswith("uniform") else 0.01)
+    x, v, _, _ = run.states[-1]
+    assert np.ptp(x[:, 0]) < 0.7  # they met,
+    assert np.abs(v[:, 1]).max() > 1.0  # and the fluid escapes sideways
+
+
+@every_problem
+def test_neighbouring_blocks_obey_the_limiter(start_taichi, runs, stepper, name):
+    graded = stepper == "regional_graded"
+    for x, _, _, level in runs[name].states[1:]:
+        found = blocks_with_levels(PROBLEMS[name].scene, x, level)
+        slowest = {block: max(levels) for block, levels in found.items()}
+        fastest = {block: min(levels) for block, levels in found.items()}
+        for block in found:
+            near = around(block, found)
+            if graded:
+                assert all(slowest[block] <= fastest[other] + 1 for other in near)
+            # R_min: a level is that of some block nearby, around which nobody is slower
+            assert any(all(slowest[k] <= slowest[block] + graded for k in around(b, found)) for b in near)
+
+
+def test_output_times_do_not_change_the_run(start_taichi, runs, stepper):
+    name = "dam_break_2d"
+    with start_taichi("cpu", "f64", cpu_max_num_threads=1):  # nor does the number of threads
+        sim = rts.Simulation(PROBLEMS[name].scene, STEPPERS[stepper])
+        sim.advance_to(PROBLEMS[name].end_time)
+        for once, in_pieces in zip(sim.state(), runs[name].states[-1], strict=True):
+            assert once.tobytes() == in_pieces.tobytes()
+        with pytest.raises(rts.TimeError, match="lies before the present"):
+            sim.advance_to(0.1)
+        with pytest.raises(rts.TimeError, match="not a finite time"):
+            sim.advance_to(float("nan"))
+        sim.advance_to(PROBLEMS[name].end_time)
+        assert sim.time == PROBLEMS[name].end_time
+        assert sim.statistics["base_steps"] == runs[name].statistics["base_steps"]
+
+
+@pytest.mark.parametrize("name", ["dam_break_2d", "dam_break_3d"])
+def test_one_level_equals_uniform_bit_for_bit(start_taichi, name):
+    states = []
+    with start_taichi("cpu", "f64"):
+        for same in (rts.Uniform(), rts.Regional(levels=1)):
+            sim = rts.Simulation(PROBLEMS[name].scene, same)
+            sim.advance_to(520.5 * sim.base_step)
+            assert sim.statistics["base_steps"] == 520
+            states.append(sim.state())
+    for uniform, regional in zip(*states, strict=True):
+        assert uniform.tobytes() == regional.tobytes()

@@ -1,0 +1,115 @@
+import numpy as np
+import pytest
+import taichi as ti
+
+from taichi_rts.backend import Backend
+from taichi_rts.grid import CELLS_PER_BLOCK, BlockGrid, Geometry, make_neighbour_sum
+from taichi_rts.particles import vector_field
+from taichi_rts.smoothing import make_kernel
+
+SUPPORT = 0.25
+CPU = Backend("cpu", "f64")
+PLAIN_LOOP = Backend("vulkan", "f64")  # lanes = 1, run on the CPU here
+
+
+def cloud(dim, seed=0, count=150):
+    """Random points in (-0.1, 0.8)^dim (no multiple of the support), and one on each corner, edge and face."""
+    rng = np.random.default_rng(seed)
+    special = np.stack(np.meshgrid(*[[-0.1, 0.35, 0.8]] * dim), axis=-1).reshape(-1, dim)
+    lines = -0.1 + SUPPORT * rng.integers(0, 4, (20, dim))  # exactly between blocks
+    return np.concatenate([rng.uniform(-0.1, 0.8, (count, dim)), special, lines])
+
+
+@ti.data_oriented
+class SortedCloud:
+    def __init__(self, x, identity):
+        self.count, dim = x.shape
+        self.geometry = Geometry((-0.1,) * dim, (0.8,) * dim, SUPPORT)
+        self.grid = BlockGrid(self.geometry, self.count)
+        self.x = vector_field(dim, ti.f64, self.count)
+        self.sorted = vector_field(dim, ti.f64, self.count + CPU.lanes)
+        self.identity = ti.field(ti.i32, self.count)
+        self.identity.from_numpy(identity.astype(np.int32))
+        self.sort(x)
+
+    def sort(self, x):
+        self.x.from_numpy(x)
+        self.grid.update(self.locate, self.identity)
+        order = self.grid.order.to_numpy()
+        self.sorted.from_numpy(np.pad(x[order], ((0, CPU.lanes), (0, 0))))
+        return order
+
+    @ti.kernel
+    def locate(self):
+        for i in range(self.count):
+            self.grid.insert(i, self.x[i])
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_counting_sort_is_stable_in_cell_and_identity(taichi_cpu_f64, dim):
+    x = cloud(dim)
+    identity = np.random.default_rng(1).permutation(len(x))
+    cloud_ = SortedCloud(x, identity)
+    for points in (x, cloud(dim, seed=2), np.full_like(x, 0.3)):
+        order = cloud_.sort(points)
+        cell = cloud_.geometry.cell_numpy(points)
+        assert order.tolist() == np.lexsort((identity, cell)).tolist()
+        assert cloud_.grid.cell_of.to_numpy().tolist() == cell.tolist()
+        start = np.searchsorted(np.sort(cell), np.arange(cloud_.geometry.cells + 1))
+        assert cloud_.grid.start.to_numpy().tolist() == start.tolist()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("backend", [CPU, PLAIN_LOOP], ids=["lanes", "plain"])
+def test_neighbour_sum_equals_brute_force_even_on_faces_and_corners(taichi_cpu_f64, dim, backend):
+    x = cloud(dim)
+    cloud_ = SortedCloud(x, np.arange(len(x)))
+    kernel = make_kernel("cubic_spline", dim, SUPPORT)
+    near = cloud_.sorted
+
+    @ti.func
+    def pair(i, j):
+        x_ij = near[i] - near[j]
+        return ti.Vector([kernel.value(x_ij.norm()), kernel.value(x_ij.norm()) * x_ij[0]])
+
+    total = make_neighbour_sum(cloud_.geometry, cloud_.grid.start, SUPPORT, pair, 2, backend)
+
+    @ti.kernel
+    def run(result: ti.types.ndarray()):
+        for k in range(cloud_.count):
+            sums = total(k, near[k])
+            result[k, 0], result[k, 1] = sums[0], sums[1]
+
+    result = np.empty((len(x), 2))
+    run(result)
+    y = x[cloud_.grid.order.to_numpy()]
+    x_ij = y[:, None] - y
+    w = kernel.sample(np.linalg.norm(x_ij, axis=2))
+    np.testing.assert_allclose(result[:, 0], w.sum(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(result[:, 1], (w * x_ij[..., 0]).sum(axis=1), atol=1e-11 * w.max())
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_neighbour_blocks_of_every_place_in_the_domain_exist(dim):
+    geometry = Geometry((-0.1,) * dim, (0.8,) * dim, SUPPORT)
+    block = geometry.cell_numpy(cloud(dim)) // CELLS_PER_BLOCK
+    assert len(geometry.neighbour_strides) == 3**dim - 1
+    assert block.min() + min(geometry.neighbour_strides) >= 0
+    assert block.max() + max(geometry.neighbour_strides) < geometry.blocks
+
+
+def test_clamp_catches_what_is_not_a_number(taichi_cpu_f64):
+    geometry = Geometry((0, 0), (1, 2), 0.5)
+
+    @ti.kernel
+    def clamp(x: ti.types.ndarray()):
+        for i in range(x.shape[0]):
+            y = geometry.clamp(ti.Vector([x[i, 0], x[i, 1]]))
+            x[i, 0], x[i, 1] = y[0], y[1]
+
+    x = np.array([[0.3, 1.7], [-1, 3], [2, -np.inf], [np.nan, np.inf]])
+    clamp(x)
+    assert x[:3].tolist() == [[0.3, 1.7], [0, 2], [1, 0]]
+    assert np.isfinite(x).all()
+    assert (x[3] >= 0).all()
+    assert (x[3] <= [1, 2]).all()
