@@ -14,9 +14,9 @@ from taichi_rts.smoothing import lattice_sum, make_kernel
 WALL_STIFFNESS = 4.0 / 3.0
 """How much steeper a wall's density profile is than the lattice's it replaces (see `calibrate_walls`).
 
-1 continues the lattice: a pool 10 particles deep settles 3.3 % too low, and 2,300 centres hit the face of the domain in a
+1 continues the lattice: a pool 10 particles deep settles 3.5 % too low, and 2,300 centres hit the faces of the domain in a
 double dam break. 2 balances a particle at rest on the wall exactly, but is so stiff that the same dam break blows up at
-courant 0.4. 4/3 settles 1.1 % too low, keeps every centre off the face, and survives courant 0.6.
+courant 0.4. 4/3 settles 1.2 % too low, keeps every centre off the faces, and survives courant 0.6 (docs/defaults.md).
 """
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 import taichi_rts as rts
 
-FALL_FROM, FALL_VELOCITY = (0.3, 0.16), (0.4, 0.5)
+FALL_VELOCITY = (0.1, -0.5)
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,10 @@ def tank_3d(*fluids):
 
 
 PROBLEMS = {
-    "dam_break_2d": Problem(tank_2d(rts.Block((0, 0), (0.4, 0.8))), 0.25),
+    "dam_break_2d": Problem(tank_2d(rts.Block((0, 0), (0.4, 0.8))), 0.18),
     "dam_break_3d": Problem(tank_3d(rts.Block((0, 0, 0), (0.24, 0.48, 0.3))), 0.12),
-    "still_pool": Problem(tank_2d(rts.Block((0, 0), (1, 0.32))), 0.25),
-    "free_fall": Problem(tank_2d(rts.Block(FALL_FROM, (0.7, 0.96), velocity=FALL_VELOCITY)), 0.18),
+    "still_pool": Problem(tank_2d(rts.Block((0, 0), (1, 0.32))), 0.15),
+    "free_fall": Problem(tank_2d(rts.Block((0.1, 0.5), (0.9, 0.9), velocity=FALL_VELOCITY)), 0.15),
     "head_on_blobs": Problem(
         tank_2d(
             rts.Block((0.08, 0.3), (0.48, 0.7), velocity=(3, 0)),
@@ -46,7 +46,7 @@ STEPPERS = {
     "uniform_adaptive": rts.Uniform(adaptive=True),
     "regional": rts.Regional(),
     "regional_paper": rts.Regional(preset="paper"),
-    "regional_graded": rts.Regional(levels=5, grading=True, inactive_density="extrapolated"),
+    "regional_graded": rts.Regional(levels=5, courant=0.2, grading=True, inactive_density="extrapolated"),
 }
 
 
