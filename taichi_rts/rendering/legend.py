@@ -80,7 +80,7 @@ def draw_colour_bar(
     upper: float,
     unit: str,
     colours,
-    position: str = "bottom-right",
+    position: str = "top-right",
 ) -> np.ndarray:
     """Return a copy of the picture with a colour bar; `colours` (K, 3) run from `lower` to `upper`."""
     size = font_size(image.shape[0])
