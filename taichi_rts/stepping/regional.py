@@ -18,13 +18,14 @@ from taichi_rts.stepping.limiter import BlockLimiter
 from taichi_rts.stepping.timeline import Timeline
 from taichi_rts.validation import FROZEN, validated
 
-LARGEST_COURANT = 0.6
-"""Courant number of the longest step at the defaults: a still pool is as calm as with uniform steps at 0.4 (rms speed
-0.002-0.005 sqrt(gH)); at 0.7 it moves twice as much, at 0.8 it simmers at 0.06 (`docs/defaults.md`)."""
+LARGEST_COURANT = 0.4
+"""Courant number of the longest step at the defaults, the same as that of `Uniform`: calm water then moves exactly as with
+uniform steps. Still pools stay calm up to 0.6 on average, though single ones differ by 40 %; at 0.7 they move twice as much,
+at 0.8 they simmer (`docs/defaults.md`)."""
 
 
 def _default_courant(levels: int) -> float:
-    return min(0.4, LARGEST_COURANT / levels)
+    return LARGEST_COURANT / levels
 
 
 PRESETS: dict[str | None, dict[str, Any]] = {
@@ -40,8 +41,8 @@ class Regional:
     """Blocks get steps of n base steps; only due particles recompute density and forces.
 
     Attributes:
-        courant: lambda_v of Eq. 1; with `strict_cfl` off it sets the base step, with it on the longest step. None: 0.4, or
-            less, so that the longest step stays at 0.6 r/c_s.
+        courant: lambda_v of Eq. 1; with `strict_cfl` off it sets the base step, with it on the longest step. None: 0.4 / levels,
+            so that the longest step is 0.4 r/c_s.
         levels: n_max, the largest n; None: 2.
         corrector: apply Serna's correction (Eq. 6-7); without it the method blows up (the paper's Figure 2).
         strict_cfl: divide the base step by n_max, so that the longest step too respects Eq. 1.

@@ -19,6 +19,7 @@ STEPPERS = {
     "uniform 0.7": rts.Uniform(courant=0.7),
     "uniform 0.8": rts.Uniform(courant=0.8),
     "regional, defaults": rts.Regional(),
+    "regional, 2 levels at 0.3": rts.Regional(courant=0.3),
     "regional, paper": rts.Regional(preset="paper"),
     "regional, paper, lambda_f 0.25": rts.Regional(preset="paper", lambda_f=0.25),
 }

@@ -26,10 +26,10 @@ def tank_3d(*fluids):
 
 
 PROBLEMS = {
-    "dam_break_2d": Problem(tank_2d(rts.Block((0, 0), (0.4, 0.8))), 0.18),
-    "dam_break_3d": Problem(tank_3d(rts.Block((0, 0, 0), (0.24, 0.48, 0.3))), 0.12),
-    "still_pool": Problem(tank_2d(rts.Block((0, 0), (1, 0.32))), 0.15),
-    "free_fall": Problem(tank_2d(rts.Block((0.1, 0.5), (0.9, 0.9), velocity=FALL_VELOCITY)), 0.15),
+    "dam_break_2d": Problem(tank_2d(rts.Block((0, 0), (0.4, 0.8))), 0.12),
+    "dam_break_3d": Problem(tank_3d(rts.Block((0, 0, 0), (0.24, 0.48, 0.3))), 0.08),
+    "still_pool": Problem(tank_2d(rts.Block((0, 0), (1, 0.32))), 0.1),
+    "free_fall": Problem(tank_2d(rts.Block((0.1, 0.5), (0.9, 0.9), velocity=FALL_VELOCITY)), 0.12),
     "head_on_blobs": Problem(
         tank_2d(
             rts.Block((0.08, 0.3), (0.48, 0.7), velocity=(3, 0)),

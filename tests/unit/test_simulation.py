@@ -4,8 +4,8 @@ import pytest
 import taichi_rts as rts
 from taichi_rts.simulation import REORDER_EVERY
 
-SCENE = rts.Scene(domain=rts.Box((0, 0), (1, 1)), fluids=[rts.Block((0, 0), (0.4, 0.8))], spacing=0.04)
-SMALL = SCENE.replace(fluids=(rts.Block((0.2, 0.2), (0.4, 0.6), velocity=(1, -2)),))
+FALLING = rts.Block((0.2, 0.2), (0.4, 0.6), velocity=(1, -2))
+SMALL = rts.Scene(domain=rts.Box((0, 0), (1, 1)), fluids=[FALLING], spacing=0.04)
 
 
 def test_readers_before_the_first_step(taichi_cpu_f64):
@@ -42,7 +42,7 @@ def test_what_is_not_a_number_ends_the_run(taichi_cpu_f64, field):
 
 
 def test_reordering_in_memory_keeps_the_state_and_its_ids(taichi_cpu_f64):
-    sim = rts.Simulation(SCENE)
+    sim = rts.Simulation(SMALL)
     sim.advance_to(20 * sim.base_step)
     before = sim.state()
     sim.particles.reorder(sim.grid.order)
