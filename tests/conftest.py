@@ -7,6 +7,15 @@ import taichi_rts as rts
 from taichi_rts import backend
 
 
+QUICK = {"advanced_optimization": False}
+"""Compiles a quarter faster. Not where bits of different kernels are compared or results are validated."""
+
+
+@pytest.fixture(scope="session")
+def quick():
+    return QUICK
+
+
 @pytest.fixture(scope="session")
 def start_taichi(tmp_path_factory):
     cache = str(tmp_path_factory.mktemp("taichi_cache"))  # shared, so that a kernel met before is not compiled again
@@ -29,7 +38,7 @@ def taichi_cpu(start_taichi):
 
 @pytest.fixture
 def taichi_cpu_f64(start_taichi):
-    with start_taichi("cpu", "f64") as started:
+    with start_taichi("cpu", "f64", **QUICK) as started:
         yield started
 
 

@@ -13,9 +13,9 @@ def stepper(request):
 
 
 @pytest.fixture(scope="module")
-def runs(start_taichi, stepper):
+def runs(start_taichi, quick, stepper):
     def run(problem):
-        with start_taichi("cpu", "f64"):  # anew for each, or the cache does not know the kernels again
+        with start_taichi("cpu", "f64", **quick):  # anew for each, or the cache does not know the kernels again
             return record(problem, STEPPERS[stepper])
 
     return {name: run(problem) for name, problem in PROBLEMS.items()}
@@ -99,10 +99,10 @@ def test_neighbouring_blocks_obey_the_limiter(runs, stepper, name):
             assert any(all(slowest[k] <= slowest[block] + graded for k in around(b, found)) for b in near)
 
 
-def test_output_times_do_not_change_the_run(start_taichi, runs, stepper):
+def test_output_times_do_not_change_the_run(start_taichi, quick, runs, stepper):
     name = "dam_break_2d"
     options = {"cpu_max_num_threads": 1} if stepper == "regional_paper" else {}  # nor does the number of threads
-    with start_taichi("cpu", "f64", **options):
+    with start_taichi("cpu", "f64", **quick, **options):
         sim = rts.Simulation(PROBLEMS[name].scene, STEPPERS[stepper])
         sim.advance_to(PROBLEMS[name].end_time)
         for once, in_pieces in zip(sim.state(), runs[name].states[-1], strict=True):

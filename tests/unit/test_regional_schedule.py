@@ -40,8 +40,8 @@ def record_step(sim):
 
 
 @pytest.fixture(scope="module")
-def recorded(start_taichi):
-    with start_taichi("cpu", "f64"):
+def recorded(start_taichi, quick):
+    with start_taichi("cpu", "f64", **quick):
         sim = rts.Simulation(SCENE, STEPPER)
         sim.advance_to(0.06)
         yield sim, [record_step(sim) for _ in range(8)]
