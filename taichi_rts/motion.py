@@ -100,9 +100,10 @@ class Motion:
             x = self.integrator.correct_position(self.near.x[k], a, a_new, dt)
             v = self.integrator.correct_velocity(self.particles.v[i], a, a_new, dt)
             v, a_new = self.limit(v, self.largest_speed), self.limit(a_new, self.largest_acceleration)
-            finite = True
+            finite = True  # of what was given too: a position that is not a number has been clamped to a corner by now
             for d in ti.static(range(self.particles.dim)):
-                finite = finite and not (ti.math.isnan(x[d]) or ti.math.isinf(x[d]) or ti.math.isnan(a_new[d]))
+                total = self.particles.x[i][d] + v[d] + a_new[d]
+                finite = finite and not (ti.math.isnan(total) or ti.math.isinf(total))
             if not finite:
                 self.not_finite[None] += 1
             inside = self.geometry.clamp(x)

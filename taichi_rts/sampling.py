@@ -104,7 +104,7 @@ def calibrate_walls(scene: Scene) -> tuple[float, float]:
     """Depth [m] of the wall layer behind a face and volume V_b [m^dim] of its particles, for a lattice resting on the face.
 
     Its nearest layer, half a spacing from the face, must have its rest density, so the wall replaces what the missing half
-    of the lattice would add: V S(d) = s^dim D. S(d) is the sum of W over the wall's plane at distance d, D the sum over the
+    of the lattice would add: V S(d) = D m/rho_0. S(d) is the sum of W over the wall's plane at distance d, D the sum over the
     missing layers. And the wall should carry it: it pushes with p_i alone where the missing half would push with p_i and
     p_j, so its slope has to be steeper: S'(d)/S(d) = WALL_STIFFNESS D'/D. The two give d, then V.
     """
@@ -128,7 +128,7 @@ def calibrate_walls(scene: Scene) -> tuple[float, float]:
     for _ in range(60):
         middle = 0.5 * (near + far)
         near, far = (middle, far) if slope(plane, middle) / plane(middle) > wanted else (near, middle)
-    return near - 0.5 * s, s**dim * missing(s) / plane(near)
+    return near - 0.5 * s, missing(s) / (plane(near) * lattice_sum(kernel, dim, s))
 
 
 def _product(axes: list[np.ndarray]) -> np.ndarray:

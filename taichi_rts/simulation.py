@@ -70,6 +70,7 @@ class Simulation:
         self.overhead = Overhead(self.particles.count)
         self._tally = Tally(self.particles.count, self.schedule.levels)
         self._uncollected = 0
+        self._steps = 0
         self._time = 0.0
         began = clock.perf_counter()
         self.step()  # lines 1-2: validity 0, so everybody is due at tick 0, where the first forces are evaluated
@@ -114,7 +115,8 @@ class Simulation:
 
     def _count_step(self) -> None:
         self._uncollected += 1
-        if self._uncollected % REORDER_EVERY == 0:
+        self._steps += 1
+        if self._steps % REORDER_EVERY == 0:
             self.particles.reorder(self.grid.order)
         if (self._uncollected + 1) * self.particles.count > COUNTER_LIMIT:
             self._collect_counts()

@@ -48,7 +48,6 @@ def test_walls_complete_the_density_of_a_resting_layer(kernel, dim, ratio):
     assert density(scene, resting, with_walls=True) == pytest.approx(1000.0, rel=0.006)
 
 
-@pytest.mark.xfail(strict=True, reason="calibrate_walls takes s^dim for the calibrated particle volume m/rho_0")
 @mediums
 def test_walls_complete_the_density_exactly(kernel, dim, ratio):
     resting = np.full((1, dim), 0.45)

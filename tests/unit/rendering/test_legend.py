@@ -61,7 +61,7 @@ def test_delta_subscript_and_other_signs_leave_no_empty_box():
 
 
 def test_colour_bar_shows_its_colours_in_order():
-    picture = draw_colour_bar(blank(), "speed", 0.0, 4.5, "m/s", [(1, 0, 0), (0, 1, 0)]).astype(int)
+    picture = draw_colour_bar(blank(), "speed", 0.0, 4.5, "m/s", [(1, 0, 0), (0, 1, 0)], "bottom-right").astype(int)
     rows, columns = np.nonzero((picture[..., 2] < 5) & (np.ptp(picture, axis=2) > 100))
     row = np.bincount(rows).argmax()
     line = picture[row, columns[rows == row]]
