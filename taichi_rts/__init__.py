@@ -14,11 +14,13 @@ from taichi_rts.errors import (
 )
 from taichi_rts.scene import Block, Box, Scene, View, load_scene, scene_names
 from taichi_rts.simulation import Simulation
+from taichi_rts.stepping.asynchronous import Asynchronous
 from taichi_rts.stepping.regional import Regional
 from taichi_rts.stepping.uniform import Uniform
 
 __version__ = "0.1.0"
 __all__ = [
+    "Asynchronous",
     "BackendError",
     "Block",
     "Box",

@@ -68,12 +68,12 @@ class Tally:
     def statistics(self) -> dict[str, Any]:
         """Return the counts as a plain dict; fractions per level are averages over all particles and steps."""
         total = max(1, sum(self.particle_steps))
-        updates = sum(self.updates)
+        updates, full = sum(self.updates), max(1, self.base_steps * self.count)
         return {
             "base_steps": self.base_steps,
             "particle_updates": updates,
             "wall_seconds": self.wall_seconds,
-            "active_fraction": updates / total if self.base_steps else 1.0,
+            "active_fraction": updates / full if self.base_steps else 1.0,
             "level_fractions": [n / total for n in self.particle_steps],
             "update_fractions": [n / max(1, updates) for n in self.updates],
         }

@@ -20,13 +20,20 @@ MARGIN = 1  # blocks around the domain, so that no neighbour index leaves the gr
 
 @ti.data_oriented
 class Geometry:
-    """How space is cut: origin [m], block side [m] (at least the support radius), shape in blocks with margin."""
+    """How space is cut: origin [m], block side [m], shape in blocks with margin.
 
-    def __init__(self, lower: Sequence[float], upper: Sequence[float], side: float) -> None:
+    With `drift` zero a block's side is the support radius. Where the grid serves for longer than one step, particles may
+    drift by up to `drift` [m] from where they were sorted in, and two that interact by twice that: the side grows by as much,
+    so that they still lie in neighbouring blocks, and `reach` is how far from a particle its neighbours were sorted in.
+    """
+
+    def __init__(self, lower: Sequence[float], upper: Sequence[float], support: float, drift: float = 0.0) -> None:
         self.dim = len(lower)
         self.lower = tuple(lower)
         self.upper = tuple(upper)
-        self.side = side
+        self.side = side = support + 2.0 * drift
+        self.drift = drift
+        self.reach = support + drift
         inside = [max(1, math.ceil((b - a) / side - 1e-9)) for a, b in zip(lower, upper, strict=True)]
         # A centre exactly on the upper face belongs to one more block; it and the wall layers share the margin.
         self.shape = tuple(n + 2 * MARGIN + 1 for n in inside)
@@ -89,6 +96,7 @@ class BlockGrid:
         self.cell_of = ti.field(ti.i32, count)
         self.rank = ti.field(ti.i32, count)
         self.order = ti.field(ti.i32, count)
+        self.order.from_numpy(np.arange(count, dtype=np.int32))
         self.cell_count = ti.field(ti.i32, geometry.cells)
         self.start = ti.field(ti.i32, geometry.cells + 1)
         self.scan = ExclusiveScan(self.cell_count, self.start)
@@ -138,12 +146,13 @@ class BlockGrid:
 
 
 def make_neighbour_sum(
-    geometry: Geometry, start: ti.Field, support: float, pair: Callable[..., Any], width: int, backend: Backend
+    geometry: Geometry, start: ti.Field, pair: Callable[..., Any], width: int, backend: Backend
 ) -> Callable[..., Any]:
-    """Return a ti.func `total(i, x)`: the sum of `pair(i, j)`, a vector of `width`, over all j near `x` [m].
+    """Return a ti.func `total(i, x, cell)`: the sum of `pair(i, j)`, a vector of `width`, over all j near `x` [m].
 
-    j runs over places of the sorted arrays that `start` indexes; pairs beyond the support are offered too, so `pair`
-    must vanish there by itself. The inner loop has a constant length on the CPU (`Backend.lanes`).
+    `cell` is the one that `x` was sorted into. j runs over places of the sorted arrays that `start` indexes; pairs beyond the
+    support are offered too, so `pair` must vanish there by itself. The inner loop has a constant length on the CPU
+    (`Backend.lanes`).
     """
     lanes = backend.lanes
     dtype = backend.dtype
@@ -167,11 +176,11 @@ def make_neighbour_sum(
         return total
 
     @ti.func
-    def sum_all(i, x):
+    def sum_all(i, x, cell):
         total = ti.Vector.zero(dtype, width)
-        low = geometry.column(x[0] - support)
-        high = geometry.column(x[0] + support) + 1
-        row = geometry.row(x)
+        low = geometry.column(x[0] - geometry.reach)
+        high = geometry.column(x[0] + geometry.reach) + 1
+        row = cell // row_length
         if ti.static(geometry.dim == 2):
             for dy in range(-1, 2):
                 base = (row + dy) * row_length

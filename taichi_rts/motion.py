@@ -1,4 +1,4 @@
-"""The passes that move particles: where they are now, what neighbours see of them, and the corrected new state."""
+"""The passes that move particles: where they are at a given time, what neighbours see of them, and the corrected new state."""
 
 from typing import Any
 
@@ -19,7 +19,10 @@ They bound the damage once a run has blown up: unlimited, particles pile up in a
 
 @ti.data_oriented
 class Motion:
-    """Prediction and correction with one integrator. `now` is a tick, `tick` its length [s]."""
+    """Prediction and correction with one integrator. `now` is a tick, `tick` its length [s].
+
+    `read_at[block]` says when a block's particles are read, in ticks after `now`, and is negative where nobody reads them.
+    """
 
     def __init__(
         self,
@@ -47,14 +50,53 @@ class Motion:
 
     @ti.func
     def elapsed(self, i, now, tick):
-        """Time [s] since the last force evaluation of particle `i`."""
+        """Time [s] from the last force evaluation of particle `i` to tick `now`; negative if that lies before it."""
         return ti.cast(now - self.particles.updated[i], float) * tick
 
     @ti.func
-    def position(self, i, dt):
-        """Predicted position [m] of particle `i`, `dt` [s] after its last evaluation, kept inside the domain."""
+    def position(self, i, dt, tick):
+        """Position [m] of particle `i`, `dt` [s] after its last evaluation, kept inside the domain.
+
+        Within its step that is the prediction; before it (dt < 0) the cubic through the positions and velocities of its
+        last two evaluations (Hermite), so a reader who lives in the past interpolates as well.
+        """
         p = self.particles
-        return self.geometry.clamp(self.integrator.predict_position(p.x[i], p.v[i], p.a[i], dt))
+        x = self.integrator.predict_position(p.x[i], p.v[i], p.a[i], dt)
+        if ti.static(p.has_past):
+            if dt < 0.0:
+                h = ti.cast(p.updated[i] - p.past_updated[i], float) * tick
+                s = 1.0 + dt / h
+                ascent, descent = s * s * (3.0 - 2.0 * s), (1.0 - s) * (1.0 - s) * (1.0 + 2.0 * s)
+                slopes = (1.0 - s) * p.past_v[i] - s * p.v[i]
+                x = descent * p.past_x[i] + ascent * p.x[i] + (s * (1.0 - s) * h) * slopes
+        return self.geometry.clamp(x)
+
+    @ti.func
+    def share_of_past(self, i, dt, tick):
+        """How much the evaluation before the last counts, `dt` < 0 [s] after the last, in linear interpolation."""
+        return -dt / (ti.cast(self.particles.updated[i] - self.particles.past_updated[i], float) * tick)
+
+    @ti.func
+    def velocity(self, i, dt, tick):
+        """Velocity [m/s] of particle `i` that forces see, `dt` [s] after its last evaluation."""
+        p = self.particles
+        v = self.integrator.predict_velocity(p.v[i], p.a[i], dt)
+        if ti.static(p.has_past):
+            if dt < 0.0:
+                v = p.v[i] + self.share_of_past(i, dt, tick) * (p.past_v[i] - p.v[i])
+        return v
+
+    @ti.func
+    def density(self, i, dt, tick):
+        """Density [kg/m^3] of particle `i` that neighbours see, `dt` [s] after its last evaluation."""
+        p = self.particles
+        rho = p.rho[i]
+        if ti.static(p.has_rho_rate):
+            rho += p.rho_rate[i] * dt
+        if ti.static(p.has_past):
+            if dt < 0.0:
+                rho = p.rho[i] + self.share_of_past(i, dt, tick) * (p.past_rho[i] - p.rho[i])
+        return rho
 
     @ti.func
     def limit(self, vector, largest: ti.template()):
@@ -70,31 +112,32 @@ class Motion:
     def locate_particles(self, now: ti.i32, tick: float):
         """Algorithm 1, line 4: count every particle into the cell of its present position."""
         for i in range(self.particles.count):
-            self.grid.insert(i, self.position(i, self.elapsed(i, now, tick)))
+            self.grid.insert(i, self.position(i, self.elapsed(i, now, tick), tick))
 
     @ti.kernel
-    def predict_neighbourhood(self, touched: ti.template(), now: ti.i32, tick: float):
+    def predict_neighbourhood(self, read_at: ti.template(), now: ti.i32, tick: float):
         """Lines 25-26, for all particles in blocks that a due particle may read, and for no others."""
-        for block in touched:
-            if touched[block] == 1:
+        for block in read_at:
+            if read_at[block] >= 0:
                 for k in range(self.grid.first(block), self.grid.first(block + 1)):
                     i = self.grid.order[k]
-                    dt = self.elapsed(i, now, tick)
-                    self.near.x[k] = self.position(i, dt)
-                    self.near.v[k] = self.integrator.predict_velocity(self.particles.v[i], self.particles.a[i], dt)
-                    rho = self.particles.rho[i]
-                    if ti.static(self.particles.has_rho_rate):
-                        rho += self.particles.rho_rate[i] * dt
+                    dt = self.elapsed(i, now + read_at[block], tick)
+                    self.near.x[k] = self.position(i, dt, tick)
+                    self.near.v[k] = self.velocity(i, dt, tick)
+                    rho = self.density(i, dt, tick)
                     self.near.rho[k] = rho
                     self.near.p_over_rho2[k] = self.equation_of_state.pressure(rho) / (rho * rho)
 
     @ti.kernel
-    def advance_due(self, due: ti.template(), due_count: ti.template(), now: ti.i32, tick: float):
-        """Lines 22-29: new acceleration of each due particle, then its corrected state, which holds from `now` on."""
+    def advance_due(
+        self, due: ti.template(), due_count: ti.template(), read_at: ti.template(), now: ti.i32, tick: float
+    ):
+        """Lines 22-29: new acceleration of each due particle, then its corrected state, which holds from this time on."""
         for n in range(due_count[None]):
             k = due[n]
             i = self.grid.order[k]
-            dt = self.elapsed(i, now, tick)
+            present = now + read_at[self.grid.block(i)]
+            dt = self.elapsed(i, present, tick)
             a = self.particles.a[i]
             a_new = self.momentum.acceleration(k)
             x = self.integrator.correct_position(self.near.x[k], a, a_new, dt)
@@ -112,10 +155,14 @@ class Motion:
                     self.stopped[None] += 1
                     if (x[d] - inside[d]) * v[d] > 0.0:
                         v[d] = 0.0
+            if ti.static(self.particles.has_past):
+                self.particles.past_x[i] = self.particles.x[i]
+                self.particles.past_v[i] = self.particles.v[i]
+                self.particles.past_updated[i] = self.particles.updated[i]
             self.particles.x[i] = inside
             self.particles.v[i] = v
             self.particles.a[i] = a_new
-            self.particles.updated[i] = now
+            self.particles.updated[i] = present
 
     @ti.kernel
     def export(
@@ -131,8 +178,10 @@ class Motion:
         """Write the state at `ahead` [s] after `now`, in order of particle id, into arrays outside Taichi."""
         for i in range(self.particles.count):
             dt = self.elapsed(i, now, tick) + ahead
-            position = self.position(i, dt)
+            position = self.position(i, dt, tick)
             velocity = self.particles.v[i] + self.particles.a[i] * dt
+            if ti.static(self.particles.has_past):
+                velocity = self.velocity(i, dt, tick)
             identity = self.particles.identity[i]
             for d in ti.static(range(self.particles.dim)):
                 x[identity, d] = position[d]

@@ -24,7 +24,9 @@ class Particles:
 
     `rho_rate` d rho/dt [kg/(m^3 s)] exists only where a stepper extrapolates densities.
     `updated` is the tick of the last force evaluation, `level` the step in base steps (0 before the first evaluation),
-    `identity` the stable particle id. Fields are re-sorted now and then so that neighbours in space lie close in memory.
+    `identity` the stable particle id. The `past_` fields are the state at the evaluation before; they exist only where a
+    stepper lets some particles run ahead of others, so that readers may look back. Fields are re-sorted now and then so that
+    neighbours in space lie close in memory.
     """
 
     def __init__(
@@ -35,6 +37,7 @@ class Particles:
         backend: Backend,
         *,
         with_rho_rate: bool = False,
+        with_past: bool = False,
     ) -> None:
         self.count, self.dim = positions.shape
         self.x = vector_field(self.dim, backend.dtype, self.count)
@@ -46,6 +49,12 @@ class Particles:
         self.updated = ti.field(ti.i32, self.count)
         self.level = ti.field(ti.i32, self.count)
         self.identity = ti.field(ti.i32, self.count)
+        self.has_past = with_past
+        if with_past:
+            self.past_x = vector_field(self.dim, backend.dtype, self.count)
+            self.past_v = vector_field(self.dim, backend.dtype, self.count)
+            self.past_rho = ti.field(backend.dtype, self.count)
+            self.past_updated = ti.field(ti.i32, self.count)
         self.real_scratch = ti.field(backend.dtype, self.count)
         self.integer_scratch = ti.field(ti.i32, self.count)
         self.x.from_numpy(positions.astype(backend.numpy_dtype))
@@ -64,7 +73,7 @@ class Particles:
                 self.real_scratch[k] = field[order[k]]
             for k in range(self.count):
                 field[k] = self.real_scratch[k]
-        for field in ti.static([self.updated, self.level, self.identity]):
+        for field in ti.static(self._integer_fields()):
             for k in range(self.count):
                 self.integer_scratch[k] = field[order[k]]
             for k in range(self.count):
@@ -73,8 +82,14 @@ class Particles:
             order[k] = k
 
     def _real_fields(self) -> list[ti.Field]:
-        vectors = [field.get_scalar_field(d) for field in (self.x, self.v, self.a) for d in range(self.dim)]
-        return [*vectors, self.rho] + ([self.rho_rate] if self.rho_rate is not None else [])
+        vectors = [self.x, self.v, self.a] + ([self.past_x, self.past_v] if self.has_past else [])
+        scalars = (
+            [self.rho] + ([self.past_rho] if self.has_past else []) + ([self.rho_rate] if self.has_rho_rate else [])
+        )
+        return [field.get_scalar_field(d) for field in vectors for d in range(self.dim)] + scalars
+
+    def _integer_fields(self) -> list[ti.Field]:
+        return [self.updated, self.level, self.identity] + ([self.past_updated] if self.has_past else [])
 
 
 @ti.data_oriented

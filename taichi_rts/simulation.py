@@ -24,7 +24,7 @@ from taichi_rts.scene import Scene
 from taichi_rts.stepping.base import Stepper
 from taichi_rts.stepping.regional import Regional
 
-REORDER_EVERY = 32  # steps between moving the state itself into the grid's order, for locality only
+REORDER_EVERY = 32  # sorts between moving the state itself into the grid's order, for locality only
 COUNTER_LIMIT = 2**30  # counts on the device are 32-bit; they are collected before they can overflow
 
 
@@ -49,8 +49,10 @@ class Simulation:
             scene.rest_density,
             backend,
             with_rho_rate=self.stepper.extrapolates_density,
+            with_past=self.stepper.keeps_past,
         )
-        geometry = Geometry(scene.domain.lower, scene.domain.upper, scene.support)
+        drift = self.stepper.drift * scene.support
+        geometry = Geometry(scene.domain.lower, scene.domain.upper, scene.support, drift)
         self.grid = BlockGrid(geometry, self.particles.count)
         self.near = Neighbourhood(self.particles.count, scene.dim, backend)
         self.walls = Walls(start.wall_positions, start.wall_volumes, geometry, backend) if scene.walls else None
@@ -69,14 +71,12 @@ class Simulation:
 
         self.overhead = Overhead(self.particles.count)
         self._tally = Tally(self.particles.count, self.schedule.levels)
-        self._uncollected = 0
-        self._steps = 0
+        self._sorts = 0
         self._time = 0.0
         began = clock.perf_counter()
         self.step()  # lines 1-2: validity 0, so everybody is due at tick 0, where the first forces are evaluated
         self.schedule.take_counts()
-        self.schedule.next_ticks()
-        self.particles.reorder(self.grid.order)  # with the two lines above: so that `wall_seconds` holds no compilation
+        self.schedule.begin(self.timeline, 0)  # as the line above: so that `wall_seconds` holds no compilation
         ti.sync()
         self.setup_seconds = clock.perf_counter() - began
 
@@ -85,13 +85,21 @@ class Simulation:
         now, tick = self.timeline.now, self.timeline.tick
         schedule = self.schedule
         with self.overhead.shared:
-            self.grid.update(self.motion.locate_particles, self.particles.identity, now, tick)  # line 4
+            if schedule.needs_sorting:
+                self._sort(now, tick)  # line 4
             schedule.select(now, tick)  # lines 5-16
-            self.motion.predict_neighbourhood(schedule.touched, now, tick)  # lines 25-26, where somebody looks
+            self.motion.predict_neighbourhood(schedule.read_at, now, tick)  # lines 25-26, where somebody looks
         with self.overhead.due:
             self.density.update(schedule.due, schedule.due_count)  # lines 18-21
-            self.motion.advance_due(schedule.due, schedule.due_count, now, tick)  # lines 22-29
-        schedule.observe()
+            self.motion.advance_due(schedule.due, schedule.due_count, schedule.read_at, now, tick)  # lines 22-29
+        schedule.observe(now, tick)
+
+    def _sort(self, now: int, tick: float) -> None:
+        if self._sorts % REORDER_EVERY == 0:
+            self.particles.reorder(self.grid.order)
+        self._sorts += 1
+        self.grid.update(self.motion.locate_particles, self.particles.identity, now, tick)
+        self.schedule.sorted(now, tick)
 
     def advance_to(self, time: float) -> None:
         """Run all steps up to physical `time` [s]; readers then predict to exactly that time.
@@ -104,29 +112,20 @@ class Simulation:
         target = self.timeline.ticks_until(time)
         ti.sync()
         began = clock.perf_counter()
-        while self.timeline.now + (ticks := self.schedule.next_ticks()) <= target:
-            self.timeline.now += ticks
+        while self.schedule.begin(self.timeline, target):
             with self.overhead.sampled_step(self.schedule.due_count):
                 self.step()
-            self._count_step()
+            if (self.schedule.steps - self._tally.base_steps + 1) * self.particles.count > COUNTER_LIMIT:
+                self._collect_counts()
         ti.sync()
         self._tally.wall_seconds += clock.perf_counter() - began
         self._collect_counts()
         self._time = float(time)
         self._check_finite()
 
-    def _count_step(self) -> None:
-        self._uncollected += 1
-        self._steps += 1
-        if self._steps % REORDER_EVERY == 0:
-            self.particles.reorder(self.grid.order)
-        if (self._uncollected + 1) * self.particles.count > COUNTER_LIMIT:
-            self._collect_counts()
-
     def _collect_counts(self) -> None:
-        if self._uncollected:
-            self._tally.add(self._uncollected, *self.schedule.take_counts())
-            self._uncollected = 0
+        if steps := self.schedule.steps - self._tally.base_steps:
+            self._tally.add(steps, *self.schedule.take_counts())
 
     def _check_finite(self) -> None:
         broken = int(self.motion.not_finite[None])
@@ -193,6 +192,7 @@ class Simulation:
             "overhead_fraction": self.overhead.fraction,
             "stopped_by_domain": int(self.motion.stopped[None]),
             "runaways": int(self.motion.runaways[None]),
+            **self.schedule.statistics(),
         }
 
     def energy(self) -> Energy:

@@ -35,6 +35,7 @@ class SummationDensity:
         self.has_walls = walls is not None
         self.equation_of_state = medium.equation_of_state
         self.with_rate = particles.has_rho_rate
+        self.keeps_past = particles.has_past
         kernel, mass, rest_density = medium.kernel, medium.mass, medium.rest_density
         tiny = (1e-6 * medium.support) ** 2
         width = 2 if self.with_rate else 1
@@ -57,10 +58,9 @@ class SummationDensity:
         def wall_pair(i, b):
             return rest_density * walls.volume[b] * contribution(near.x[i] - walls.x[b], near.v[i])
 
-        geometry, support = grid.geometry, medium.support
-        self.sum_fluid = make_neighbour_sum(geometry, grid.start, support, fluid_pair, width, backend)
+        self.sum_fluid = make_neighbour_sum(grid.geometry, grid.start, fluid_pair, width, backend)
         if walls is not None:
-            self.sum_walls = make_neighbour_sum(geometry, walls.start, support, wall_pair, width, backend)
+            self.sum_walls = make_neighbour_sum(grid.geometry, walls.start, wall_pair, width, backend)
 
     @ti.kernel
     def update(self, due: ti.template(), due_count: ti.template()):
@@ -68,12 +68,14 @@ class SummationDensity:
         for n in range(due_count[None]):
             k = due[n]
             i = self.grid.order[k]
-            x = self.near.x[k]
-            total = self.sum_fluid(k, x)
+            x, cell = self.near.x[k], self.grid.cell_of[i]
+            total = self.sum_fluid(k, x, cell)
             if ti.static(self.has_walls):
                 if self.walls.near[self.grid.block(i)] == 1:
-                    total += self.sum_walls(k, x)
+                    total += self.sum_walls(k, x, cell)
             rho = total[0]
+            if ti.static(self.keeps_past):
+                self.particles.past_rho[i] = self.particles.rho[i]
             self.near.rho[k] = rho
             self.near.p_over_rho2[k] = self.equation_of_state.pressure(rho) / (rho * rho)
             self.particles.rho[i] = rho

@@ -60,8 +60,7 @@ class MomentumEquation:
         self.gravity = tuple(gravity)
         dim = grid.geometry.dim
         kernel, mass, rest_density = medium.kernel, medium.mass, medium.rest_density
-        support = medium.support
-        tiny = (1e-6 * support) ** 2  # keeps grad W of a particle on itself, which is zero, from becoming 0/0
+        tiny = (1e-6 * medium.support) ** 2  # keeps grad W of a particle on itself, which is zero, from becoming 0/0
         terms = list(terms)
 
         @ti.func
@@ -82,19 +81,19 @@ class MomentumEquation:
                 acceleration += term.wall_pair(i, b, x_ib, d2)
             return rest_density * walls.volume[b] * kernel.gradient_factor(ti.sqrt(d2 + tiny)) * acceleration
 
-        geometry = grid.geometry
-        self.sum_fluid = make_neighbour_sum(geometry, grid.start, support, fluid_pair, dim, backend)
+        self.sum_fluid = make_neighbour_sum(grid.geometry, grid.start, fluid_pair, dim, backend)
         if walls is not None:
-            self.sum_walls = make_neighbour_sum(geometry, walls.start, support, wall_pair, dim, backend)
+            self.sum_walls = make_neighbour_sum(grid.geometry, walls.start, wall_pair, dim, backend)
 
     @ti.func
     def acceleration(self, k):
         """Acceleration [m/s^2], (dim,), of the particle at place `k`."""
-        x = self.near.x[k]
-        total = self.sum_fluid(k, x)
+        i = self.grid.order[k]
+        x, cell = self.near.x[k], self.grid.cell_of[i]
+        total = self.sum_fluid(k, x, cell)
         if ti.static(self.has_walls):
-            if self.walls.near[self.grid.block(self.grid.order[k])] == 1:
-                total += self.sum_walls(k, x)
+            if self.walls.near[self.grid.block(i)] == 1:
+                total += self.sum_walls(k, x, cell)
         for d in ti.static(range(self.grid.geometry.dim)):
             total[d] += self.gravity[d]
         return total

@@ -24,6 +24,14 @@ class Stepper(Protocol):
     def extrapolates_density(self) -> bool:
         """Whether the densities of particles that are not due follow d rho/dt, which then has to be computed."""
 
+    @property
+    def keeps_past(self) -> bool:
+        """Whether particles may be read at times before their last evaluation, so that the state before it is needed."""
+
+    @property
+    def drift(self) -> float:
+        """How far a particle may move, over the support radius, before the grid is sorted anew; 0: every step."""
+
     def make_integrator(self) -> Any:
         """Return the integrator, an object as in `taichi_rts.integrators`."""
 
@@ -40,29 +48,49 @@ class Schedule:
 
     Attributes:
         due: places (in the grid's order) of the due particles, ascending; `due_count` of them.
-        touched: 1 for each block whose particles a due particle may read.
+        read_at: for each block the time at which due particles may read its particles, in ticks after `now`; negative
+            where none does.
         base_ticks: ticks in one base step.
         levels: number of levels; level n steps every n base steps.
+        needs_sorting: whether the grid has to be sorted before the present step.
+        steps: base steps begun so far.
     """
 
     levels = 1
     base_ticks = 1
+    needs_sorting = True
 
     def __init__(self, particles: Particles, grid: BlockGrid) -> None:
         self.particles = particles
         self.grid = grid
         self.due = ti.field(ti.i32, particles.count)
         self.due_count = ti.field(ti.i32, ())
-        self.touched = ti.field(ti.i32, grid.geometry.blocks)
+        self.read_at = ti.field(ti.i32, grid.geometry.blocks)
+        self.steps = 0
+
+    def begin(self, timeline: Timeline, target: int) -> bool:
+        """Set the clock to the next step and return True, unless that step ends after tick `target`.
+
+        What the steps are depends on the state only, never on `target`.
+        """
+        ticks = self.next_ticks()
+        if timeline.now + ticks > target:
+            return False
+        timeline.now += ticks
+        self.steps += 1
+        return True
 
     def next_ticks(self) -> int:
         """Length of the next step in ticks; it depends on the state only."""
         return 1
 
+    def sorted(self, now: int, tick: float) -> None:
+        """Take note that the grid has been sorted anew."""
+
     def select(self, now: int, tick: float) -> None:
         """Decide who is due at tick `now` (Algorithm 1, lines 5-16)."""
 
-    def observe(self) -> None:
+    def observe(self, now: int, tick: float) -> None:
         """Look at the state after a step, to choose the next."""
 
     def take_counts(self) -> tuple[list[int], list[int]]:
@@ -71,3 +99,7 @@ class Schedule:
         Empty lists stand for "every particle, every step, level 1".
         """
         return [], []
+
+    def statistics(self) -> dict[str, Any]:
+        """Return what else this stepper has to say about the work so far."""
+        return {}

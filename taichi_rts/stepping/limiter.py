@@ -1,4 +1,4 @@
-"""Limits between neighbouring blocks: how much longer than its neighbours' a block's step may be."""
+"""Limits between neighbouring blocks: how much longer than its neighbours' a block's step may be, and how it may grow."""
 
 import taichi as ti
 
@@ -7,24 +7,77 @@ from taichi_rts.grid import Geometry
 
 @ti.data_oriented
 class BlockLimiter:
-    """Lowers the level of a block to its smallest neighbour's plus `jump`, for the 8 (26) blocks around it.
+    """Lowers the step of a block, in base steps, to `factor` times its shortest neighbour's plus `jump`.
 
-    `jump = 0` is the paper's R_min: the outer layer of the slower side takes the faster side's step. `jump = 1` is one
-    sweep of grading (Saitoh & Makino 2009 limit neighbours in the same spirit). Empty blocks (level `EMPTY`) limit nobody.
+    `factor = 1, jump = 0` is the paper's R_min: the outer layer of the slower side takes the faster side's step. `jump = 1` is
+    one sweep of grading. Neighbours are the 8 (26) blocks around; empty ones (`EMPTY`) limit nobody.
     """
 
-    EMPTY = 1 << 20
+    EMPTY = 1 << 30
 
     def __init__(self, geometry: Geometry) -> None:
         self.strides = geometry.neighbour_strides
         self.blocks = geometry.blocks
 
+    @ti.func
+    def shortest_beside(self, steps, block):
+        """Shortest step of the blocks around `block`; `EMPTY` if they are."""
+        shortest = self.EMPTY
+        for stride in ti.static(self.strides):
+            shortest = ti.min(shortest, steps[block + stride])
+        return shortest
+
+    @ti.func
+    def limited(self, step, shortest, factor, jump):
+        """Return `step` or what the shortest neighbour allows; `EMPTY` limits nobody."""
+        return step if shortest == self.EMPTY else ti.min(step, factor * shortest + jump)
+
     @ti.kernel
-    def limit(self, source: ti.template(), target: ti.template(), jump: ti.i32):
-        """Write the limited levels of `source` to `target`, (blocks,) both."""
+    def limit(self, source: ti.template(), target: ti.template(), factor: ti.i32, jump: ti.i32):
+        """Write the limited steps of `source` to `target`, (blocks,) both."""
         for block in range(self.blocks):
-            level = source[block]
-            if level != self.EMPTY:
-                for stride in ti.static(self.strides):
-                    level = ti.min(level, source[block + stride] + jump)
-            target[block] = level
+            step = source[block]
+            if step != self.EMPTY:
+                step = self.limited(step, self.shortest_beside(source, block), factor, jump)
+            target[block] = step
+
+
+@ti.data_oriented
+class NeighbourLimiter:
+    """The neighbour limiter of `Regional` and `Asynchronous` (Saitoh & Makino 2009; Durier & Dalla Vecchia 2012).
+
+    Between neighbours: no step exceeds `RATIO` times a neighbour's, and whoever is in the middle of a longer one is woken:
+    its step ends at the present time and is corrected with the time that really elapsed (`woken_end`).
+    In time: a step shrinks at once; it grows by one level, and only when synchronised, i.e. at a tick that is a whole number
+    of the longer steps (`settled`). `doubling` says what one level is: twice the step, or one base step more.
+    """
+
+    RATIO = 2
+
+    def __init__(self, doubling: bool, aligned: bool = True) -> None:
+        self.doubling = doubling
+        self.aligned = aligned
+
+    @ti.func
+    def settled(self, wanted, current, now):
+        """Step [ticks] that a block at tick `now` may take after a step of `current`, if it wants `wanted`."""
+        step = wanted
+        if wanted > current:
+            step = ti.min(wanted, self.next_level(current))
+            if ti.static(self.aligned):
+                if now % step != 0:
+                    step = current
+        return step
+
+    @ti.func
+    def next_level(self, step):
+        """The step one level above."""
+        return 2 * step if ti.static(self.doubling) else step + 1
+
+    @ti.func
+    def woken_end(self, began, step, now, shortest):
+        """Tick at which a step from `began` over `step` ends, beside a neighbour that stepped by `shortest` at tick `now`.
+
+        It ends where a step of `RATIO * shortest` would have ended, or now if that is past; never later than planned.
+        """
+        return ti.min(began + step, ti.max(now, began + self.RATIO * shortest))

@@ -67,6 +67,8 @@ class Regional:
     inactive_density: Literal["stale", "extrapolated"] = "stale"
 
     name: ClassVar[str] = "regional"
+    keeps_past: ClassVar[bool] = False
+    drift: ClassVar[float] = 0.0
 
     def resolved(self, key: str) -> Any:
         """Return parameter `key`: as given, else from the preset."""
@@ -133,7 +135,7 @@ class RegionalSchedule(Schedule):
         self.update_validity(now)
         self.scan.run()
         self.compact_due()
-        self.mark_touched()
+        self.mark_read()
 
     @ti.kernel
     def determine_regions(self, now: ti.i32, tick: float):
@@ -162,10 +164,10 @@ class RegionalSchedule(Schedule):
 
     def apply_minimum_region(self) -> None:
         """R_min of Section 3, then the sweeps of grading."""
-        self.limiter.limit(self.raw_level, self.block_level, 0)
+        self.limiter.limit(self.raw_level, self.block_level, 1, 0)
         for _ in range(self.grading_sweeps):
-            self.limiter.limit(self.block_level, self.raw_level, 1)
-            self.limiter.limit(self.raw_level, self.block_level, 1)
+            self.limiter.limit(self.block_level, self.raw_level, 1, 1)
+            self.limiter.limit(self.raw_level, self.block_level, 1, 1)
 
     @ti.kernel
     def update_validity(self, now: ti.i32):
@@ -201,15 +203,15 @@ class RegionalSchedule(Schedule):
                         n += 1
 
     @ti.kernel
-    def mark_touched(self):
-        """Flag the blocks that hold a due particle or lie beside one that does; the others are left alone."""
+    def mark_read(self):
+        """Have the blocks read now that hold a due particle or lie beside one that does; the others are left alone."""
         for block in range(self.blocks):
-            touched = 0
+            due = 0
             if self.block_level[block] != BlockLimiter.EMPTY:
-                touched = ti.min(self.block_due[block], 1)
+                due = self.block_due[block]
                 for stride in ti.static(self.grid.geometry.neighbour_strides):
-                    touched = ti.max(touched, ti.min(self.block_due[block + stride], 1))
-            self.touched[block] = touched
+                    due = ti.max(due, self.block_due[block + stride])
+            self.read_at[block] = 0 if due > 0 else -1
 
     def take_counts(self) -> tuple[list[int], list[int]]:
         """Return particles and updates per level since the last call."""

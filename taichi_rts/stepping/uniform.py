@@ -40,6 +40,8 @@ class Uniform:
 
     name: ClassVar[str] = "uniform"
     extrapolates_density: ClassVar[bool] = False
+    keeps_past: ClassVar[bool] = False
+    drift: ClassVar[float] = 0.0
 
     def make_integrator(self) -> Any:
         """Return the integrator's object."""
@@ -67,7 +69,6 @@ class UniformSchedule(Schedule):
     def __init__(self, particles: Particles, grid: BlockGrid) -> None:
         super().__init__(particles, grid)
         particles.level.fill(1)
-        self.touched.fill(1)
         self.due_count[None] = particles.count
         self.mark_all()
 
@@ -100,7 +101,7 @@ class AdaptiveSchedule(UniformSchedule):
             ti.atomic_max(self.speed2[None], self.particles.v[i].norm_sqr())
             ti.atomic_max(self.acceleration2[None], self.particles.a[i].norm_sqr())
 
-    def observe(self) -> None:
+    def observe(self, now: int, tick: float) -> None:
         """Reduce the maxima that the next step depends on."""
         self.reduce_maxima()
 

@@ -72,12 +72,12 @@ def test_neighbour_sum_equals_brute_force_even_on_faces_and_corners(taichi_cpu_f
         x_ij = near[i] - near[j]
         return ti.Vector([kernel.value(x_ij.norm()), kernel.value(x_ij.norm()) * x_ij[0]])
 
-    total = make_neighbour_sum(cloud_.geometry, cloud_.grid.start, SUPPORT, pair, 2, backend)
+    total = make_neighbour_sum(cloud_.geometry, cloud_.grid.start, pair, 2, backend)
 
     @ti.kernel
     def run(result: ti.types.ndarray()):
         for k in range(cloud_.count):
-            sums = total(k, near[k])
+            sums = total(k, near[k], cloud_.grid.cell_of[cloud_.grid.order[k]])
             result[k, 0], result[k, 1] = sums[0], sums[1]
 
     result = np.empty((len(x), 2))

@@ -43,7 +43,7 @@ def test_no_block_keeps_more_than_its_neighbours_raw_level_plus_jump(taichi_cpu,
     for seed in range(3):
         raw = random_levels(geometry, seed=seed)
         source.from_numpy(raw)
-        limiter.limit(source, target, jump)
+        limiter.limit(source, target, 1, jump)
         limited = target.to_numpy()
         occupied = raw != EMPTY
         expected = np.minimum(raw, lowest_neighbour(geometry, raw) + jump)

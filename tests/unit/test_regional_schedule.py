@@ -27,7 +27,7 @@ def record_step(sim):
         seen["before"] = snapshot(sim)
         select(now, tick)
         seen["due"] = schedule.due.to_numpy()[: schedule.due_count[None]]
-        for name in ("raw_level", "block_level", "touched"):
+        for name in ("raw_level", "block_level", "read_at"):
             seen[name] = getattr(schedule, name).to_numpy()
         seen["order"] = sim.grid.order.to_numpy()
         seen["block"] = sim.grid.cell_of.to_numpy()[seen["order"]] // CELLS_PER_BLOCK
@@ -117,7 +117,7 @@ def test_blocks_without_due_neighbours_are_not_touched_at_all(recorded):
         idle_block = np.ones(sim.grid.geometry.blocks, dtype=np.int32)
         idle_block[step["block"][step["due"]]] = 0
         spare = np.minimum(idle_block, lowest_around(sim, idle_block, 1))[step["block"]] == 1
-        assert (step["touched"][step["block"]] == ~spare).all()
+        assert ((step["read_at"][step["block"]] == 0) == ~spare).all()
         for name in ("near_x", "near_v", "near_rho", "near_p"):
             assert (step["after"][name][spare] == step["before"][name][spare]).all()
         spared += np.count_nonzero(spare)
@@ -131,7 +131,7 @@ def test_who_is_read_was_predicted_to_the_present(recorded):
         dt = ((step["now"] - old["updated"]) * sim.base_step)[order, None]
         predicted = old["x"][order] + old["v"][order] * dt + 0.5 * old["a"][order] * dt**2
         predicted = np.clip(predicted, SCENE.domain.lower, SCENE.domain.upper)
-        touched = step["touched"][step["block"]] == 1
+        touched = step["read_at"][step["block"]] == 0
         np.testing.assert_allclose(step["after"]["near_x"][touched], predicted[touched], rtol=0, atol=1e-14)
         idle = touched.copy()
         idle[step["due"]] = False

@@ -51,5 +51,5 @@ def test_reordering_does_not_depend_on_output_times(taichi_cpu_f64, monkeypatch)
     calls = []
     monkeypatch.setattr(sim.particles, "reorder", calls.append)
     for n in range(8):
-        sim.advance_to((n + 1) * 0.25 * REORDER_EVERY * sim.base_step)
+        sim.advance_to((n + 1) * 0.25 * REORDER_EVERY * sim.base_step)  # the first sort was at tick 0
     assert len(calls) == 2

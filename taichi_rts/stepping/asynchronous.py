@@ -1,0 +1,495 @@
+"""Asynchronous time stepping (Pregent, *Asynchronous SPH*): every cell keeps its own time.
+
+A cell is a block of the grid. Its time T is that of its youngest particle, i.e. the earliest end of a step. It steps when no
+neighbouring cell is younger: then every neighbour is in the middle of a step that spans T and can be interpolated to T.
+Forces are evaluated at T; they correct the steps that end there and begin the next, as long as the cell's own limits allow.
+
+Why this never extrapolates. A reader at time T in cell C reads particle j of C or of a cell beside it. (1) j's step ends
+at T or later, because no cell beside C is younger than T. (2) j's last evaluation may lie after T, where C was woken or j
+came from a cell further away; then j's evaluation before it lies at or before T, because a cell only steps if its
+last evaluation lies at or before the youngest time T_min of all cells, T_min <= T, and T_min never goes back. The
+same two states give every particle at any output time in reach without stepping it.
+"""
+
+import math
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+import taichi as ti
+from pydantic import Field, model_validator
+from pydantic.dataclasses import dataclass
+
+from taichi_rts.errors import StepperError
+from taichi_rts.grid import BlockGrid
+from taichi_rts.integrators.serna import Serna
+from taichi_rts.particles import Particles
+from taichi_rts.scan import ExclusiveScan
+from taichi_rts.scene import Positive, Scene
+from taichi_rts.stepping import criteria
+from taichi_rts.stepping.base import Courant, Schedule
+from taichi_rts.stepping.limiter import BlockLimiter, NeighbourLimiter
+from taichi_rts.stepping.timeline import Timeline
+from taichi_rts.validation import FROZEN, validated
+
+LARGEST_COURANT = 0.4  # as for `Uniform` and `Regional`
+DRIFT = 0.05
+"""How far a particle may move over the support radius between two sorts: a little more than the longest step at Mach 0.1."""
+MACH = 0.1
+"""Speeds up to this share of c_s do not shorten a step: the sound speed is chosen for them (Becker & Teschner 2007)."""
+LOG = 1 << 14  # passes whose width is kept on the device between two looks
+
+
+@validated(StepperError)
+@dataclass(frozen=True, config=FROZEN)
+class Asynchronous:
+    """Every cell (a block of the grid) has its own time and its own step.
+
+    Attributes:
+        courant: the longest step is courant r/c_s; a cell faster than Mach 0.1 takes 1.1 courant r/(c_s + |v|). None: 0.4.
+        levels: base steps (ticks) in the longest step; 1 forces all steps equal.
+        steps: lengths that steps may have, in ticks: "powers_of_two" keeps cells in step with each other, so that many can
+            step at once; "integers" rounds the limits down to whole ticks only.
+        lambda_f: factor of the force limit, Eq. 2 of Goswami & Batty 2014.
+        limiter: bound a cell's step by its neighbours', wake neighbours, and let steps grow by one level at a time.
+        inactive_density: what a stepping cell reads of others: carried through their steps with d rho/dt ("extrapolated", to
+            the end of the step at most), as positions and velocities are, or "stale" (of the last evaluation), which makes
+            the method first order.
+        stagger: None, or the seed of random first steps, after which all cells have different ages.
+    """
+
+    courant: Courant | None = None
+    levels: Annotated[int, Field(ge=1, le=1024)] = 8
+    steps: Literal["powers_of_two", "integers"] = "powers_of_two"
+    lambda_f: Positive = 0.05
+    limiter: bool = True
+    inactive_density: Literal["extrapolated", "stale"] = "extrapolated"
+    stagger: Annotated[int, Field(ge=0, lt=2**31)] | None = None
+
+    name: ClassVar[str] = "asynchronous"
+
+    @property
+    def longest_courant(self) -> float:
+        """Courant number of the longest step: as given, or that of `Uniform`."""
+        return LARGEST_COURANT if self.courant is None else self.courant
+
+    @model_validator(mode="after")
+    def _check(self) -> "Asynchronous":
+        if self.steps == "powers_of_two" and self.levels & (self.levels - 1):
+            below = 1 << (self.levels.bit_length() - 1)
+            raise ValueError(
+                f"levels {self.levels} is no power of two; use {below} or {2 * below}, or steps='integers'"
+            )
+        return self
+
+    @property
+    def extrapolates_density(self) -> bool:
+        """Whether d rho/dt is needed."""
+        return self.inactive_density == "extrapolated" and self.levels > 1
+
+    @property
+    def keeps_past(self) -> bool:
+        """Whether cells may have different times."""
+        return self.levels > 1
+
+    @property
+    def drift(self) -> float:
+        """With all steps equal every sort serves for one step only."""
+        return DRIFT if self.levels > 1 else 0.0
+
+    def make_integrator(self) -> Any:
+        """Return the integrator's object: second order for any sequence of steps, corrected with the time that elapsed."""
+        return Serna()
+
+    def timeline(self, scene: Scene) -> Timeline:
+        """Return a clock that ticks `levels` times in the longest step."""
+        step = min(
+            criteria.acoustic_step(self.longest_courant, scene.support, scene.wave_speed),
+            criteria.viscous_step(scene.support, scene.kinematic_viscosity),
+        )
+        return Timeline(step / self.levels)
+
+    def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
+        """Build the fields and kernels that find the cells that may step."""
+        return AsynchronousSchedule(self, scene, particles, grid, timeline)
+
+
+@ti.data_oriented
+class AsynchronousSchedule(Schedule):
+    """Passes: each collects the cells that may step, and after their evaluation gives them their next steps.
+
+    Passes come in cycles. A cycle begins at tick `now`, when no particle's last evaluation lies after it and no step ends
+    before it; then the grid is sorted, by positions at that one time. Cells hold at the cycle's end until all have arrived.
+    Within a cycle a cell's particles stay the same, so a particle that crosses into a cell of another time does so between two
+    cycles: it keeps its own time, and the cell steps at the time of its youngest particle; who is older is left out until
+    the cell has come to its time.
+    """
+
+    EMPTY = BlockLimiter.EMPTY
+
+    def __init__(
+        self, stepper: Asynchronous, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline
+    ) -> None:
+        super().__init__(particles, grid)
+        self.stepper = stepper
+        self.scene = scene
+        self.tick = timeline.tick
+        self.levels = stepper.levels
+        self.powers_of_two = stepper.steps == "powers_of_two"
+        self.staggered = stepper.stagger is not None
+        self.seed = stepper.stagger or 0
+        self.beside = BlockLimiter(grid.geometry)
+        self.limiter = NeighbourLimiter(doubling=True, aligned=self.powers_of_two)
+        self.fast_reach = (1.0 + MACH) * stepper.longest_courant * scene.support  # [m]
+        self.slow_speed = MACH * scene.wave_speed
+        blocks = grid.geometry.blocks
+        self.blocks = blocks
+        self.occupied = ti.field(ti.i32, blocks)
+        self.occupied_flag = ti.field(ti.i32, blocks)
+        self.occupied_start = ti.field(ti.i32, blocks + 1)
+        self.occupied_scan = ExclusiveScan(self.occupied_flag, self.occupied_start)
+        self.occupied_count = self.occupied_scan.total
+        self.time = ti.field(ti.i32, blocks)
+        """Tick of each cell: the end of its youngest particle's step; `EMPTY` where there is none."""
+        self.step = ti.field(ti.i32, blocks)
+        """Shortest step [ticks] of each cell's particles."""
+        self.proposal = ti.field(ti.i32, blocks)
+        self.ready = ti.field(ti.i32, blocks)
+        self.claim = ti.field(ti.i32, blocks)
+        self.block_due = ti.field(ti.i32, blocks)
+        self.due_start = ti.field(ti.i32, blocks + 1)
+        self.due_scan = ExclusiveScan(self.block_due, self.due_start)
+        self.due_count = self.due_scan.total
+        self.time.fill(self.EMPTY)
+        self.step.fill(self.EMPTY)
+        self.youngest = ti.field(ti.i32, ())
+        self.stepping = ti.field(ti.i32, ())
+        self.speed2 = ti.field(float, ())
+        self.acceleration2 = ti.field(float, ())
+        self.passes = ti.field(ti.i32, ())
+        self.widths = ti.field(ti.i32, LOG)
+        self.wakes = ti.field(ti.i32, ())
+        self.updates = ti.field(ti.i32, self.levels + 1)
+        self.target = 0
+        self.cycle_end = self.cycle_length()
+        self.cycles = 1
+        self.launched = 0
+        self.seen_widths: list[np.ndarray] = []
+
+    # -- what the host decides: cycles ------------------------------------------------------------------------------
+
+    def begin(self, timeline: Timeline, target: int) -> bool:
+        """Return True while some cell's time is not after tick `target`; starts a new cycle where one is over."""
+        self.target = target
+        youngest = int(self.youngest[None])
+        if youngest > target:
+            self.steps = max(self.steps, target)
+            return False
+        self.needs_sorting = youngest >= self.cycle_end
+        if self.needs_sorting:
+            timeline.now = self.steps = youngest
+            length = self.cycle_length()
+            self.cycle_end = (timeline.now // length + 1) * length
+            self.cycles += 1
+        self.launched += 1
+        if self.launched == LOG:
+            self.collect_widths()
+        return True
+
+    def cycle_length(self) -> int:
+        """Ticks that the coming cycle may take: as long as nobody drifts further than the grid allows."""
+        if self.levels == 1:
+            return 1
+        self.reduce_maxima()
+        speed, acceleration = math.sqrt(self.speed2[None]), math.sqrt(self.acceleration2[None])
+        longest = self.levels * self.tick
+        drift = (speed + 0.5 * acceleration * longest) * self.tick  # [m] per tick
+        allowed = self.grid.geometry.drift
+        ticks = min(self.levels, math.floor(allowed / drift)) if 0.0 < drift < math.inf else self.levels
+        ticks = max(1, ticks)
+        return 1 << (ticks.bit_length() - 1) if self.powers_of_two else ticks
+
+    @ti.kernel
+    def find_youngest(self):
+        """T_min: the earliest time of all cells."""
+        self.youngest[None] = self.EMPTY
+        for m in range(self.occupied_count[None]):
+            ti.atomic_min(self.youngest[None], self.time[self.occupied[m]])
+
+    @ti.kernel
+    def reduce_maxima(self):
+        self.speed2[None] = 0.0
+        self.acceleration2[None] = 0.0
+        for i in range(self.particles.count):
+            ti.atomic_max(self.speed2[None], self.particles.v[i].norm_sqr())
+            ti.atomic_max(self.acceleration2[None], self.particles.a[i].norm_sqr())
+
+    def sorted(self, now: int, tick: float) -> None:
+        """Find the occupied cells, their times and steps."""
+        self.forget_cells()
+        self.occupied_scan.run()
+        self.list_occupied()
+        self.read_cells()
+        self.find_youngest()
+
+    @ti.kernel
+    def forget_cells(self):
+        for block in range(self.blocks):
+            self.occupied_flag[block] = ti.cast(self.grid.first(block) < self.grid.first(block + 1), ti.i32)
+            self.time[block] = self.EMPTY
+            self.step[block] = self.EMPTY
+            self.proposal[block] = self.EMPTY
+            self.ready[block] = self.EMPTY
+            self.claim[block] = self.EMPTY
+            self.block_due[block] = 0
+            self.read_at[block] = -1
+
+    @ti.kernel
+    def list_occupied(self):
+        for block in range(self.blocks):
+            if self.occupied_flag[block] == 1:
+                self.occupied[self.occupied_start[block]] = block
+
+    @ti.kernel
+    def read_cells(self):
+        for m in range(self.occupied_count[None]):
+            self.read_cell(self.occupied[m])
+
+    @ti.func
+    def read_cell(self, block):
+        """Take a cell's time and step from its particles."""
+        time, step = self.EMPTY, self.EMPTY
+        for k in range(self.grid.first(block), self.grid.first(block + 1)):
+            i = self.grid.order[k]
+            time = ti.min(time, self.end(i))
+            step = ti.min(step, self.particles.level[i])
+        self.time[block] = time
+        self.step[block] = step
+
+    @ti.func
+    def end(self, i):
+        """Tick at which the step of particle `i` ends."""
+        return self.particles.updated[i] + self.particles.level[i]
+
+    # -- before the evaluation: which cells step --------------------------------------------------------------------
+
+    def select(self, now: int, tick: float) -> None:
+        """Find the cells that may step, the particles due in them, and when each cell near them is read."""
+        self.find_ready(self.target, self.cycle_end)
+        self.claim_neighbourhoods()
+        self.choose_cells()
+        self.due_scan.run()
+        self.list_due()
+        self.mark_read(now)
+
+    @ti.kernel
+    def find_ready(self, target: ti.i32, cycle_end: ti.i32):
+        """A cell may step if no neighbour is younger and its own last evaluation does not lie after the youngest of all."""
+        for m in range(self.occupied_count[None]):
+            block = self.occupied[m]
+            time, youngest = self.time[block], self.youngest[None]
+            ready = self.EMPTY
+            if youngest <= target and time < cycle_end and time <= self.beside.shortest_beside(self.time, block):
+                ready = time
+                for k in range(self.grid.first(block), self.grid.first(block + 1)):
+                    i = self.grid.order[k]
+                    if self.end(i) == time and self.particles.updated[i] > youngest:
+                        ready = self.EMPTY
+            self.ready[block] = ready
+
+    @ti.kernel
+    def claim_neighbourhoods(self):
+        """Every cell is interpolated to one time in a pass: the youngest of the ready cells around it has the claim."""
+        for m in range(self.occupied_count[None]):
+            block = self.occupied[m]
+            self.claim[block] = ti.min(self.ready[block], self.beside.shortest_beside(self.ready, block))
+
+    @ti.kernel
+    def choose_cells(self):
+        """Ready cells step if their whole neighbourhood is theirs; others wait for a later pass, which changes nothing."""
+        for m in range(self.occupied_count[None]):
+            block = self.occupied[m]
+            time = self.ready[block]
+            due = 0
+            if time != self.EMPTY and time <= self.claim[block]:
+                if time <= self.beside.shortest_beside(self.claim, block):
+                    for k in range(self.grid.first(block), self.grid.first(block + 1)):
+                        due += ti.cast(self.end(self.grid.order[k]) == time, ti.i32)
+            self.block_due[block] = due
+
+    @ti.kernel
+    def list_due(self):
+        """List the places of due particles in the grid's order, and count them by the time that has elapsed."""
+        self.stepping[None] = 0
+        for m in range(self.occupied_count[None]):
+            block = self.occupied[m]
+            if self.block_due[block] > 0:
+                self.stepping[None] += 1
+                n, time = self.due_start[block], self.time[block]
+                elapsed, count = 0, 0
+                for k in range(self.grid.first(block), self.grid.first(block + 1)):
+                    i = self.grid.order[k]
+                    if self.end(i) == time:
+                        self.due[n] = k
+                        n += 1
+                        if time - self.particles.updated[i] != elapsed:
+                            self.updates[elapsed] += count
+                            elapsed, count = time - self.particles.updated[i], 0
+                        count += 1
+                self.updates[elapsed] += count
+
+    @ti.kernel
+    def mark_read(self, now: ti.i32):
+        """Have the cells read that step or lie beside one that does, at its time."""
+        for m in range(self.occupied_count[None]):
+            block = self.occupied[m]
+            due = self.block_due[block]
+            for stride in ti.static(self.grid.geometry.neighbour_strides):
+                due = ti.max(due, self.block_due[block + stride])
+            self.read_at[block] = self.claim[block] - now if due > 0 else -1
+
+    # -- after the evaluation: the next steps -----------------------------------------------------------------------
+
+    def observe(self, now: int, tick: float) -> None:
+        """Give the cells that stepped their next step, and wake neighbours whose step is too long beside it."""
+        self.propose_steps(now, tick)
+        self.assign_steps()
+        self.end_steps(now)
+        self.log_pass()
+        self.find_youngest()
+
+    @ti.kernel
+    def propose_steps(self, now: ti.i32, tick: float):
+        """The longest step that the CFL condition and the force limit of a cell's particles allow, in ticks."""
+        for m in range(self.occupied_count[None]):
+            block = self.occupied[m]
+            step = self.step[block]
+            if self.block_due[block] > 0:
+                time = self.time[block]
+                speed2, acceleration2 = 0.0, 0.0
+                for k in range(self.grid.first(block), self.grid.first(block + 1)):
+                    i = self.grid.order[k]
+                    a = self.particles.a[i]
+                    v = self.particles.v[i] + a * (ti.cast(time - self.particles.updated[i], float) * tick)
+                    speed2, acceleration2 = ti.max(speed2, v.norm_sqr()), ti.max(acceleration2, a.norm_sqr())
+                wanted = self.longest_step(tick, ti.sqrt(speed2), ti.sqrt(acceleration2))
+                if ti.static(self.staggered):
+                    if step == 0:
+                        wanted = 1 + ti.cast(self.noise(block) % ti.cast(wanted, ti.u32), ti.i32)
+                wanted = self.rounded(wanted)
+                if ti.static(self.stepper.limiter):
+                    if step > 0:  # the first step has none to grow from
+                        wanted = self.rounded(self.limiter.settled(wanted, step, time))
+                step = self.aligned(wanted, time)
+            self.proposal[block] = step
+
+    @ti.func
+    def longest_step(self, tick, speed, acceleration):
+        """Smallest of the CFL limit with |v|, the force limit and the longest step, rounded down to at least one tick."""
+        step = ti.cast(self.levels, float)
+        if speed > self.slow_speed:
+            step = ti.min(step, self.fast_reach / ((self.scene.wave_speed + speed) * tick))
+        if acceleration > 0.0:
+            step = ti.min(step, self.stepper.lambda_f * ti.sqrt(self.scene.support / acceleration) / tick)
+        return ti.max(1, ti.cast(ti.floor(step), ti.i32))
+
+    @ti.func
+    def rounded(self, step):
+        """Round down to a length that steps may have."""
+        result = step
+        if ti.static(self.powers_of_two):
+            result = 1
+            for _ in ti.static(range(self.levels.bit_length() - 1)):
+                if 2 * result <= step:
+                    result *= 2
+        return result
+
+    @ti.func
+    def aligned(self, step, time):
+        """With powers of two a step begins at a multiple of itself, so that cells of one step meet."""
+        result = step
+        if ti.static(self.powers_of_two):
+            for _ in ti.static(range(self.levels.bit_length() - 1)):
+                if time % result != 0:
+                    result //= 2
+        return result
+
+    @ti.func
+    def noise(self, block):
+        """A random number from the stepper's seed and the cell's index."""
+        x = ti.cast(block, ti.u32) * ti.u32(2654435761) + ti.cast(self.seed, ti.u32)
+        x = (x ^ (x >> 16)) * ti.u32(2246822519)
+        return (x ^ (x >> 13)) & ti.u32(0xFFFF)
+
+    @ti.kernel
+    def assign_steps(self):
+        """Begin the next step of the particles that were evaluated."""
+        for m in range(self.occupied_count[None]):
+            block = self.occupied[m]
+            if self.block_due[block] > 0:
+                step = self.proposal[block]
+                if ti.static(self.stepper.limiter):
+                    shortest = self.beside.shortest_beside(self.proposal, block)
+                    step = self.rounded(self.beside.limited(step, shortest, self.limiter.RATIO, 0))
+                for n in range(self.due_start[block], self.due_start[block] + self.block_due[block]):
+                    i = self.grid.order[self.due[n]]
+                    self.particles.level[i] = step
+                self.step[block] = step
+
+    @ti.kernel
+    def end_steps(self, now: ti.i32):
+        """Wake cells beside a much shorter step: their steps end early; then every cell concerned takes its new time."""
+        for m in range(self.occupied_count[None]):
+            block = self.occupied[m]
+            if self.read_at[block] >= 0:
+                if ti.static(self.stepper.limiter):
+                    shortest = self.EMPTY
+                    for stride in ti.static(self.grid.geometry.neighbour_strides):
+                        if self.block_due[block + stride] > 0:
+                            shortest = ti.min(shortest, self.step[block + stride])
+                    if shortest != self.EMPTY:
+                        self.wake(block, now + self.read_at[block], shortest)
+                self.read_cell(block)
+
+    @ti.func
+    def wake(self, block, now, shortest):
+        """End the steps of a cell's particles where they are too long beside a step of `shortest` that begins at `now`."""
+        for k in range(self.grid.first(block), self.grid.first(block + 1)):
+            i = self.grid.order[k]
+            began, step = self.particles.updated[i], self.particles.level[i]
+            end = self.limiter.woken_end(began, step, now, shortest)
+            if end < began + step:
+                self.particles.level[i] = end - began
+                self.wakes[None] += 1
+
+    @ti.kernel
+    def log_pass(self):
+        """Note how many cells stepped in this pass."""
+        if self.stepping[None] > 0:
+            self.widths[self.passes[None] % LOG] = self.stepping[None]
+            self.passes[None] += 1
+
+    # -- what the run has to say ------------------------------------------------------------------------------------
+
+    def collect_widths(self) -> None:
+        """Fetch the widths of the passes since the last call."""
+        if self.launched:  # the evaluation at tick 0, before the run, is not part of it
+            self.seen_widths.append(self.widths.to_numpy()[: int(self.passes[None])])
+        self.passes[None] = self.launched = 0
+
+    def take_counts(self) -> tuple[list[int], list[int]]:
+        """Return base steps spent at each step length, and updates, since the last call."""
+        updates = self.updates.to_numpy()[1:].astype(np.int64)
+        self.updates.fill(0)
+        self.collect_widths()
+        return (updates * np.arange(1, self.levels + 1)).tolist(), updates.tolist()
+
+    def statistics(self) -> dict[str, Any]:
+        """Return passes, cells per pass, cycles (sorts of the grid) and particles woken."""
+        widths = np.concatenate(self.seen_widths) if self.seen_widths else np.zeros(0, np.int32)
+        some = widths if len(widths) else np.zeros(1, np.int32)
+        return {
+            "passes": len(widths),
+            "cells_per_pass": {"min": int(some.min()), "median": float(np.median(some)), "max": int(some.max())},
+            "cycles": self.cycles,
+            "wakes": int(self.wakes[None]),
+        }
