@@ -12,7 +12,8 @@ from taichi_rts.errors import (
     StepperError,
     TimeError,
 )
-from taichi_rts.scene import Block, Box, Scene, View, load_scene, scene_names
+from taichi_rts.scene import Scene, View, load_scene, scene_names
+from taichi_rts.shapes import Block, Box, LinearField, Sphere
 from taichi_rts.simulation import Simulation
 from taichi_rts.stepping.asynchronous import Asynchronous
 from taichi_rts.stepping.regional import Regional
@@ -26,6 +27,7 @@ __all__ = [
     "Box",
     "Energy",
     "Error",
+    "LinearField",
     "OutputError",
     "Regional",
     "RenderError",
@@ -33,6 +35,7 @@ __all__ = [
     "SceneError",
     "Simulation",
     "SimulationDivergedError",
+    "Sphere",
     "StepperError",
     "TimeError",
     "Uniform",

@@ -16,7 +16,10 @@ from taichi_rts.scene import Scene
 
 
 class Energy(NamedTuple):
-    """Energies [J] (per metre of depth in two dimensions); `potential` is 0 at the domain's floor."""
+    """Energies [J] (per metre of depth in two dimensions).
+
+    `potential` is gravity's, 0 at the domain's floor, and a body force's, 0 at its origin.
+    """
 
     kinetic: float
     potential: float
@@ -33,10 +36,12 @@ def measure_energy(
 ) -> Energy:
     """Sum kinetic, potential and internal energy [J] of particles in a fixed order, in double precision."""
     x, v, rho = (np.asarray(array, dtype=np.float64) for array in (positions, velocities, densities))
-    height = -(x @ np.asarray(scene.acceleration)) - scene.floor_potential
+    potential = -(x @ np.asarray(scene.acceleration)) - scene.floor_potential
+    if scene.body_force is not None:
+        potential += scene.body_force.potential(x)
     return Energy(
         kinetic=float(0.5 * medium.mass * (v * v).sum()),
-        potential=float(medium.mass * height.sum()),
+        potential=float(medium.mass * potential.sum()),
         internal=float(medium.mass * medium.equation_of_state.specific_energy(rho).sum()),
     )
 

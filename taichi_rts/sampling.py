@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_rts.scene import Block, Scene
+from taichi_rts.scene import Scene
+from taichi_rts.shapes import Block, Sphere, velocities
 from taichi_rts.smoothing import lattice_sum, make_kernel
 
 WALL_STIFFNESS = 4.0 / 3.0
@@ -36,15 +37,12 @@ class Sample:
 
 
 def sample(scene: Scene) -> Sample:
-    """Fill the scene's blocks with a lattice and line its walls."""
-    positions = [fill_block(scene, block) for block in scene.fluids]
-    velocities = [
-        np.tile(np.asarray(block.velocity or (0.0,) * scene.dim), (len(x), 1))
-        for block, x in zip(scene.fluids, positions, strict=True)
-    ]
+    """Fill the scene's fluids with a lattice and line its walls."""
+    positions = [fill(scene, fluid) for fluid in scene.fluids]
+    moving = [velocities(fluid, x) for fluid, x in zip(scene.fluids, positions, strict=True)]
     wall_positions, wall_volumes = line_walls(scene)
     return Sample(
-        np.concatenate(positions), np.concatenate(velocities), calibrate_mass(scene), wall_positions, wall_volumes
+        np.concatenate(positions), np.concatenate(moving), calibrate_mass(scene), wall_positions, wall_volumes
     )
 
 
@@ -55,6 +53,11 @@ def calibrate_mass(scene: Scene) -> float:
     """
     kernel = make_kernel(scene.kernel, scene.dim, scene.support)
     return scene.rest_density / lattice_sum(kernel, scene.dim, scene.spacing)
+
+
+def fill(scene: Scene, fluid: Block | Sphere) -> np.ndarray:
+    """Positions [m], (N, dim), of a fluid's particles."""
+    return fill_sphere(scene, fluid) if isinstance(fluid, Sphere) else fill_block(scene, fluid)
 
 
 def fill_block(scene: Scene, block: Block) -> np.ndarray:
@@ -71,6 +74,18 @@ def fill_block(scene: Scene, block: Block) -> np.ndarray:
         start = b - count * scene.spacing if at_upper_wall else a
         axes.append(start + (np.arange(count) + 0.5) * scene.spacing)
     return _product(axes)
+
+
+def fill_sphere(scene: Scene, sphere: Sphere) -> np.ndarray:
+    """Positions [m], (N, dim), of a lattice of the scene's spacing that lie inside the sphere.
+
+    The lattice's cells meet at the centre, so it has the centre's mirror symmetries. A cell counts whole if its middle is
+    inside, so the surface is a staircase, but N s^dim is the volume to within a few cells.
+    """
+    count = math.ceil(sphere.radius / scene.spacing)
+    offsets = _product([(np.arange(-count, count) + 0.5) * scene.spacing] * scene.dim)
+    inside = np.linalg.norm(offsets, axis=1) <= sphere.radius * (1 + 1e-9)
+    return np.asarray(sphere.centre) + offsets[inside]
 
 
 def line_walls(scene: Scene) -> tuple[np.ndarray, np.ndarray]:

@@ -17,60 +17,15 @@ from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
 from taichi_rts.errors import SceneError
-from taichi_rts.validation import FROZEN, describe, validated
+from taichi_rts.shapes import Block, Box, Fluid, LinearField, Sphere, separation, top_speed
+from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, describe, validated
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
-Vector = Annotated[tuple[float, ...], Len(2, 3)]
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
 BUILT_IN = Path(__file__).parent / "scenes"
-
-
-@validated(SceneError)
-@dataclass(frozen=True, config=FROZEN)
-class Box:
-    """An axis-aligned box between two corners: `lower` and `upper` [m], (dim,) each."""
-
-    lower: Vector
-    upper: Vector
-
-    @model_validator(mode="after")
-    def _check(self) -> Box:
-        _check_corners(self.lower, self.upper)
-        return self
-
-    @property
-    def size(self) -> tuple[float, ...]:
-        """Edge lengths [m], (dim,)."""
-        return tuple(b - a for a, b in zip(self.lower, self.upper, strict=True))
-
-
-@validated(SceneError)
-@dataclass(frozen=True, config=FROZEN)
-class Block:
-    """A block of fluid between two corners `lower` and `upper` [m], (dim,), moving at `velocity` [m/s], (dim,)."""
-
-    lower: Vector
-    upper: Vector
-    velocity: Vector | None = None
-
-    @model_validator(mode="after")
-    def _check(self) -> Block:
-        _check_corners(self.lower, self.upper)
-        if self.velocity is not None and len(self.velocity) != len(self.lower):
-            raise ValueError(
-                f"velocity {self.velocity} has {len(self.velocity)} components; the block has {len(self.lower)}"
-            )
-        return self
-
-    @property
-    def volume(self) -> float:
-        """Volume [m^3] (area [m^2] in two dimensions)."""
-        return math.prod(b - a for a, b in zip(self.lower, self.upper, strict=True))
 
 
 @validated(SceneError)
@@ -88,13 +43,14 @@ class View:
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class Scene:
-    """A closed box of walls, the blocks of fluid in it, and the constants of the fluid.
+    """A closed box of walls, the blocks and spheres of fluid in it, and the constants of the fluid.
 
     Attributes:
         domain: the box that no particle's centre leaves.
-        fluids: blocks of fluid; they may touch but not overlap.
+        fluids: blocks and spheres of fluid; they may touch but not overlap, two spheres stay half a spacing apart.
         spacing: initial particle spacing s [m].
         gravity: acceleration [m/s^2], (dim,); None: 9.81 m/s^2 along -y.
+        body_force: acceleration [m/s^2] added to gravity, linear in space; its gradient must be symmetric.
         sound_speed: c_s [m/s]; None: ten times an estimate of the largest speed (see `estimate_max_speed`).
         density: how density is computed; "summation" is the only formulation.
         kernel: "cubic_spline" or "wendland_c2".
@@ -110,9 +66,10 @@ class Scene:
     """
 
     domain: Box
-    fluids: Annotated[tuple[Block, ...], Len(1)]
+    fluids: Annotated[tuple[Fluid, ...], Len(1)]
     spacing: Positive
     gravity: Vector | None = None
+    body_force: LinearField | None = None
     sound_speed: Positive | None = None
     density: Literal["summation"] = "summation"
     kernel: Literal["cubic_spline", "wendland_c2"] = "cubic_spline"
@@ -156,22 +113,19 @@ class Scene:
     def estimate_max_speed(self) -> float:
         """Largest speed [m/s] any fluid can reach by falling from where it is: max of sqrt(|v|^2 + 2 g H).
 
-        H [m] is the height of a block's top above the lowest corner of the domain, along gravity.
+        H [m] is the height of a fluid's top above the lowest corner of the domain, along gravity, |v| the largest speed in
+        its bounding box. A body force is left out.
         """
-        g = self.acceleration
-        floor = self.floor_potential
-        fastest = 0.0
-        for block in self.fluids:
-            top = max(-sum(a * x for a, x in zip(g, corner, strict=True)) for corner in _corners(block))
-            speed2 = sum(v * v for v in block.velocity or ())
-            fastest = max(fastest, math.sqrt(speed2 + 2.0 * max(top - floor, 0.0)))
-        return fastest
+        uphill = tuple(-a for a in self.acceleration)
+        falls = (max(fluid.reach(uphill) - self.floor_potential, 0.0) for fluid in self.fluids)
+        return max(
+            math.sqrt(top_speed(fluid) ** 2 + 2.0 * fall) for fluid, fall in zip(self.fluids, falls, strict=True)
+        )
 
     @property
     def floor_potential(self) -> float:
         """Smallest value of -g.x over the domain [m^2/s^2]: where the potential energy is zero."""
-        g = self.acceleration
-        return min(-sum(a * x for a, x in zip(g, corner, strict=True)) for corner in _corners(self.domain))
+        return -self.domain.reach(self.acceleration)
 
     def replace(self, **changes: Any) -> Scene:
         """Return a copy with some fields changed; raises `SceneError` as the constructor does."""
@@ -183,7 +137,8 @@ class Scene:
         return pydantic.TypeAdapter(Scene).dump_python(self, mode="json", exclude_none=True)
 
 
-_KEYS = [key for cls in (Scene, Box, Block, View) for key in cls.__dataclass_fields__]  # type: ignore[attr-defined]
+_PARTS = (Scene, Box, Block, Sphere, LinearField, View)
+_KEYS = [key for cls in _PARTS for key in cls.__dataclass_fields__]  # type: ignore[attr-defined]
 
 
 def load_scene(name: str | Path, *, particles: float | str | None = None, **changes: Any) -> Scene:
@@ -240,22 +195,8 @@ def parse_count(value: float | str) -> int:
 
 
 def _spacing_for(scene: Scene, count: int) -> float:
-    volume = sum(block.volume for block in scene.fluids)
+    volume = sum(fluid.volume for fluid in scene.fluids)
     return (volume / count) ** (1.0 / scene.dim)
-
-
-def _corners(box: Box | Block) -> list[tuple[float, ...]]:
-    corners: list[tuple[float, ...]] = [()]
-    for a, b in zip(box.lower, box.upper, strict=True):
-        corners = [(*corner, x) for corner in corners for x in (a, b)]
-    return corners
-
-
-def _check_corners(lower: tuple[float, ...], upper: tuple[float, ...]) -> None:
-    if len(lower) != len(upper):
-        raise ValueError(f"lower {lower} and upper {upper} differ in dimension; give both 2 or both 3 components")
-    if not all(a < b for a, b in zip(lower, upper, strict=True)):
-        raise ValueError(f"upper {upper} must exceed lower {lower} in every component")
 
 
 def _contradictions(scene: Scene) -> list[str]:
@@ -264,32 +205,74 @@ def _contradictions(scene: Scene) -> list[str]:
     dim = scene.dim
     if scene.gravity is not None and len(scene.gravity) != dim:
         faults.append(f"gravity {scene.gravity} has {len(scene.gravity)} components; the domain has {dim}")
-    for k, block in enumerate(scene.fluids):
-        if len(block.lower) != dim:
-            faults.append(f"fluids.{k}: has {len(block.lower)} components; the domain has {dim}")
+    faults += _body_force_faults(scene)
+    for k, fluid in enumerate(scene.fluids):
+        if len(fluid.lower) != dim:
+            faults.append(f"fluids.{k}: has {len(fluid.lower)} components; the domain has {dim}")
             continue
-        slack = 1e-9 * max(scene.domain.size)
-        low = all(a >= b - slack for a, b in zip(block.lower, scene.domain.lower, strict=True))
-        high = all(a <= b + slack for a, b in zip(block.upper, scene.domain.upper, strict=True))
-        if not (low and high):
-            faults.append(
-                f"fluids.{k}: block from {block.lower} to {block.upper} leaves the domain from "
-                f"{scene.domain.lower} to {scene.domain.upper}; move or shrink it, or enlarge the domain"
-            )
-        shortest = min(b - a for a, b in zip(block.lower, block.upper, strict=True))
-        if shortest < scene.spacing * (1 - 1e-6):
-            faults.append(
-                f"spacing: {scene.spacing} exceeds the shortest edge {shortest:g} of fluids.{k}; use at most {shortest:g}"
-            )
+        faults += _fluid_faults(scene, k, fluid)
         for other in range(k):
-            if len(scene.fluids[other].lower) == dim and _overlap(block, scene.fluids[other], slack):
-                faults.append(f"fluids.{k}: overlaps fluids.{other}; move one of them")
+            if len(scene.fluids[other].lower) == dim:
+                faults += _pair_faults(scene, k, other)
     if not faults and scene.sound_speed is None and scene.estimate_max_speed() <= 0.0:
         faults.append("sound_speed: nothing falls or moves at the start, so no default follows; give it a value [m/s]")
     return faults
 
 
-def _overlap(one: Block, two: Block, slack: float) -> bool:
-    return all(
-        a < d - slack and c < b - slack for a, b, c, d in zip(one.lower, one.upper, two.lower, two.upper, strict=True)
-    )
+def _body_force_faults(scene: Scene) -> list[str]:
+    force = scene.body_force
+    if force is None:
+        return []
+    faults = []
+    if force.dim != scene.dim:
+        faults.append(f"body_force: has {force.dim} components; the domain has {scene.dim}")
+    if not force.is_conservative:
+        faults.append(
+            f"body_force: gradient {force.gradient} is not symmetric, so it has no potential energy; "
+            "make gradient[d][e] equal gradient[e][d]"
+        )
+    if scene.sound_speed is None:
+        faults.append(
+            "sound_speed: how fast the body_force makes the fluid is not known, so no default follows; "
+            "give ten times the largest speed you expect [m/s]"
+        )
+    return faults
+
+
+def _fluid_faults(scene: Scene, k: int, fluid: Block | Sphere) -> list[str]:
+    faults = []
+    slack = _slack(scene)
+    low = all(a >= b - slack for a, b in zip(fluid.lower, scene.domain.lower, strict=True))
+    high = all(a <= b + slack for a, b in zip(fluid.upper, scene.domain.upper, strict=True))
+    if not (low and high):
+        faults.append(
+            f"fluids.{k}: {fluid.outline} leaves the domain from "
+            f"{scene.domain.lower} to {scene.domain.upper}; move or shrink it, or enlarge the domain"
+        )
+    if isinstance(fluid, Sphere):
+        name, least = "radius", fluid.radius
+    else:
+        name, least = "shortest edge", min(b - a for a, b in zip(fluid.lower, fluid.upper, strict=True))
+    if least < scene.spacing * (1 - 1e-6):
+        faults.append(f"spacing: {scene.spacing} exceeds the {name} {least:g} of fluids.{k}; use at most {least:g}")
+    return faults
+
+
+def _pair_faults(scene: Scene, k: int, other: int) -> list[str]:
+    one, two = scene.fluids[k], scene.fluids[other]
+    gap = separation(one, two)
+    slack = _slack(scene)
+    if gap < -slack:
+        return [f"fluids.{k}: overlaps fluids.{other}; move one of them"]
+    # A sphere's particles may lie on its surface, a block's stay half a spacing inside: only two spheres' can coincide.
+    both_round = isinstance(one, Sphere) and isinstance(two, Sphere)
+    if both_round and gap < 0.5 * scene.spacing - slack:
+        return [
+            f"fluids.{k}: lies {max(gap, 0.0):g} from fluids.{other}, nearer than half a spacing {0.5 * scene.spacing:g}, "
+            "so that particles could coincide; move one of them or use a smaller spacing"
+        ]
+    return []
+
+
+def _slack(scene: Scene) -> float:
+    return 1e-9 * max(scene.domain.size)  # for lengths [m] that rounding blurs

@@ -58,7 +58,9 @@ class Simulation:
         self.walls = Walls(start.wall_positions, start.wall_volumes, geometry, backend) if scene.walls else None
         self.density = SummationDensity(self.particles, self.near, self.grid, self.walls, self.medium, backend)
         terms = [Pressure(self.near), *viscosity_terms(scene, self.medium, self.near)]
-        momentum = MomentumEquation(terms, self.near, self.grid, self.walls, self.medium, scene.acceleration, backend)
+        momentum = MomentumEquation(
+            terms, self.near, self.grid, self.walls, self.medium, scene.acceleration, backend, scene.body_force
+        )
         self.motion = Motion(
             self.particles,
             self.near,

@@ -5,23 +5,37 @@ from __future__ import annotations
 import difflib
 import functools
 from collections.abc import Callable, Iterable
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import pydantic
-from pydantic import ConfigDict
+from annotated_types import Len
+from pydantic import ConfigDict, Field
 
 from taichi_rts.errors import Error
 
 FROZEN = ConfigDict(extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=False)
+Vector = Annotated[tuple[float, ...], Len(2, 3)]
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
 T = TypeVar("T", bound=type)
 
 
 def describe(error: pydantic.ValidationError, subject: str, names: Iterable[str] = ()) -> str:
-    """List all findings of `error`, one a line: path, what is wrong, the value given, a near name for an unknown key."""
+    """List all findings of `error`, one a line: path, what is wrong, the value given, a near name for an unknown key.
+
+    Tags in angle brackets, which pydantic puts into the path to say which member of a union it took, are left out.
+    """
     lines = []
-    known = sorted(names)
-    for item in error.errors(include_url=False):
-        path = ".".join(str(part) for part in item["loc"] if part != "__root__")
+    fields = list(names)
+    known = sorted(set(fields))
+    items = error.errors(include_url=False)
+    for item in items:
+        if item["type"] == "too_short" and any(_lies_within(other["loc"], item["loc"]) for other in items):
+            continue  # only because a component is invalid, which is said already
+        parts = [part for part in item["loc"] if part != "__root__" and not str(part).startswith("<")]
+        if parts and isinstance(parts[0], int) and parts[0] < len(fields):
+            parts[0] = fields[parts[0]]  # an argument that was given by its position
+        path = ".".join(str(part) for part in parts)
         message = item["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
         if item["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
             near = difflib.get_close_matches(str(item["loc"][-1]), known, n=1)
@@ -33,6 +47,10 @@ def describe(error: pydantic.ValidationError, subject: str, names: Iterable[str]
             message = f"{message} (got {item['input']!r})"
         lines.append(f"{path}: {message}" if path else message)
     return f"{subject}: " + "\n  ".join(lines)
+
+
+def _lies_within(inner: tuple[Any, ...], outer: tuple[Any, ...]) -> bool:
+    return len(inner) > len(outer) and inner[: len(outer)] == outer
 
 
 def validated(error_type: type[Error]) -> Callable[[T], T]:

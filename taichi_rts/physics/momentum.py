@@ -1,4 +1,4 @@
-"""The momentum equation: gravity, pressure and whatever viscosity terms the scene has, in one loop over neighbours."""
+"""The momentum equation: gravity, a body force, pressure and the scene's viscosity terms, in one loop over neighbours."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,6 +10,7 @@ from taichi_rts.grid import BlockGrid, make_neighbour_sum
 from taichi_rts.particles import Neighbourhood
 from taichi_rts.physics.medium import Medium
 from taichi_rts.physics.walls import Walls
+from taichi_rts.shapes import LinearField
 
 
 @ti.data_oriented
@@ -52,12 +53,17 @@ class MomentumEquation:
         medium: Medium,
         gravity: Sequence[float],
         backend: Backend,
+        body_force: LinearField | None = None,
     ) -> None:
         self.grid = grid
         self.near = near
         self.walls = walls
         self.has_walls = walls is not None
         self.gravity = tuple(gravity)
+        self.has_body_force = body_force is not None
+        if body_force is not None:
+            self.force_gradient = body_force.gradient
+            self.force_origin, self.force_value = body_force.base
         dim = grid.geometry.dim
         kernel, mass, rest_density = medium.kernel, medium.mass, medium.rest_density
         tiny = (1e-6 * medium.support) ** 2  # keeps grad W of a particle on itself, which is zero, from becoming 0/0
@@ -96,4 +102,9 @@ class MomentumEquation:
                 total += self.sum_walls(k, x, cell)
         for d in ti.static(range(self.grid.geometry.dim)):
             total[d] += self.gravity[d]
+        if ti.static(self.has_body_force):
+            for d in ti.static(range(self.grid.geometry.dim)):
+                total[d] += self.force_value[d]
+                for e in ti.static(range(self.grid.geometry.dim)):
+                    total[d] += self.force_gradient[d][e] * (x[e] - self.force_origin[e])
         return total

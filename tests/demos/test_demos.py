@@ -15,8 +15,10 @@ COARSE = {
     "still_pool": 0.1,
     "dam_break_2d": 0.05,
     "double_dam_break_2d": 0.05,
+    "elliptical_drop": 0.1,
+    "oscillating_drop": 0.1,
 }
-END = {"martin_moyce": 0.02}
+END = {"martin_moyce": 0.02, "elliptical_drop": 0.0082, "oscillating_drop": 0.5}
 
 
 @pytest.mark.parametrize("demo", DEMOS, ids=lambda path: path.stem)

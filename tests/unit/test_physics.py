@@ -6,6 +6,7 @@ import taichi as ti
 
 import taichi_rts as rts
 from taichi_rts import simulation
+from taichi_rts.diagnostics import measure_energy
 from taichi_rts.physics.equation_of_state import Tait
 from taichi_rts.physics.medium import Medium
 from taichi_rts.physics.momentum import MomentumEquation, Pressure
@@ -107,6 +108,31 @@ def test_pair_forces_conserve_momentum_to_rounding(taichi_cpu_f64, dim):
         assert sim.walls is None
         assert sim.particles.rho_rate is None
         assert {field.n for field in (sim.particles.x, sim.particles.v, sim.particles.a, sim.near.x)} == {2}
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_body_force_is_added_to_gravity_and_is_the_slope_of_the_potential_energy(taichi_cpu_f64, dim):
+    gradient = ((-3, 0.5, 0), (0.5, 2, -1), (0, -1, 4))
+    field = rts.LinearField([row[:dim] for row in gradient[:dim]], value=(1, -2, 3)[:dim], origin=(0.2, 0.1, 0.4)[:dim])
+    gravity = (0.3, -9.81, 0.7)[:dim]
+    scene = make_scene(dim, walls=False, gravity=gravity, body_force=field)
+    sim = rts.Simulation(scene, rts.Uniform())
+    x = 1.05 * sample(scene).positions  # too thin for any pressure
+    a, rho = evaluate(sim, x, np.zeros_like(x))
+    assert rho.max() < 1000
+    y = x - np.array(field.origin)
+    wanted = np.array(gravity) + np.array(field.value) + y @ np.array(field.gradient).T
+    np.testing.assert_allclose(a, wanted, rtol=1e-12, atol=1e-12)
+
+    step = 1e-4
+    for d in range(dim):
+        ahead, behind = (measure_energy(scene, sim.medium, x + e * np.eye(dim)[d], x, rho) for e in (step, -step))
+        force = (behind.potential - ahead.potential) / (2 * step)
+        assert force == pytest.approx(sim.medium.mass * wanted[:, d].sum(), rel=1e-7)
+
+
+def test_without_a_body_force_there_is_no_code_for_it(taichi_cpu_f64):
+    assert not rts.Simulation(make_scene(), rts.Uniform()).motion.momentum.has_body_force
 
 
 @pytest.fixture

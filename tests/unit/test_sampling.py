@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.sampling import calibrate_mass, calibrate_walls, fill_block, line_walls, sample
+from taichi_rts.sampling import calibrate_mass, calibrate_walls, fill_block, fill_sphere, line_walls, sample
 from taichi_rts.smoothing import make_kernel
 
 S = 0.1
@@ -116,3 +116,43 @@ def test_velocities_and_order_follow_the_blocks():
     blocks = [rts.Block((0, 0), (0.2, 0.2)), rts.Block((0.5, 0.5), (0.8, 0.6), velocity=(1, -2))]
     start = sample(filled(2, fluids=blocks))
     assert start.velocities.tolist() == [[0, 0]] * 4 + [[1, -2]] * 3
+
+
+@pytest.mark.parametrize(("dim", "count"), [(2, 52), (3, 304)])
+def test_sphere_is_filled_symmetrically_about_its_centre(dim, count):
+    centre = (0.43, 0.52, 0.5)[:dim]
+    sphere = rts.Sphere(centre, 0.42)
+    offsets = fill_sphere(filled(dim, fluids=[sphere]), sphere) - centre
+    assert len(offsets) == count
+    assert count * S**dim == pytest.approx(sphere.volume, rel=0.1)
+    assert np.linalg.norm(offsets, axis=1).max() <= 0.42
+    np.testing.assert_allclose(offsets.mean(axis=0), 0, atol=1e-15)
+    assert set(np.abs(offsets).ravel().round(9)) == {0.05, 0.15, 0.25, 0.35}
+    places = {tuple(x) for x in offsets.round(9).tolist()}
+    assert len(places) == count
+    assert {x[::-1] for x in places} == {(-x[0], *x[1:]) for x in places} == places
+
+
+def test_smallest_sphere_has_a_particle_in_each_quadrant():
+    sphere = rts.Sphere((0.5, 0.5), S)
+    assert len(fill_sphere(filled(2, fluids=[sphere]), sphere)) == 4
+
+
+@pytest.mark.parametrize("touching", [0.0, 1e-12])
+def test_sphere_touching_a_block_keeps_half_a_spacing(touching):
+    fluids = [rts.Block((0, 0), (1, 0.3)), rts.Sphere((0.5, 0.553 - touching), 0.253)]
+    x = sample(filled(2, fluids=fluids)).positions
+    gaps = np.linalg.norm(x[:, None] - x, axis=2)[~np.eye(len(x), dtype=bool)]
+    assert gaps.min() >= 0.5 * S
+
+
+def test_a_linear_velocity_is_evaluated_at_each_particle():
+    field = rts.LinearField(((-3, 1), (0, 4)), value=(5, 0), origin=(0.5, 0.5))
+    fluids = [rts.Block((0, 0), (1, 0.1)), rts.Sphere((0.5, 0.5), 0.2, velocity=field)]
+    start = sample(filled(2, fluids=fluids))
+    x, y = (start.positions[10:] - 0.5).T
+    assert start.velocities[:10].tolist() == [[0, 0]] * 10
+    np.testing.assert_allclose(start.velocities[10:], np.stack([5 - 3 * x + y, 4 * y], axis=1), rtol=1e-12, atol=1e-15)
+    block = rts.Block((0, 0), (0.2, 0.1), velocity=field)
+    moving = sample(filled(2, fluids=[block])).velocities
+    np.testing.assert_allclose(moving, [[5.9, -1.8], [5.6, -1.8]], rtol=1e-12)

@@ -1,12 +1,29 @@
+import dataclasses
+import json
 import math
 
+import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.scene import parse_count
+from taichi_rts.scene import parse_count, scene_from
+from taichi_rts.shapes import separation
 
 UNIT = rts.Box((0, 0), (1, 1))
 DAM = rts.Block((0, 0), (0.5, 0.5))
+DROP = rts.Sphere((0.7, 0.7), 0.2)
+CENTRAL = rts.LinearField(((-1, 0), (0, -1)))
+SPHERES = """
+spacing = 0.1
+domain = { lower = [0.0, 0.0], upper = [1.0, 1.0] }
+[[fluids]]
+lower = [0.0, 0.0]
+upper = [0.5, 0.4]
+[[fluids]]
+centre = [0.7, 0.7]
+radius = 0.2
+velocity = { gradient = [[-100.0, 0.0], [0.0, 100.0]] }
+"""
 TOML = """
 spacing = 0.1
 domain = { lower = [0.0, 0.0], upper = [1.0, 1.0] }
@@ -53,6 +70,40 @@ def write(folder, text, name="my_scene.toml"):
         ),
         ({"spacing": 0.6}, ["spacing: 0.6 exceeds the shortest edge 0.5 of fluids.0; use at most 0.5"]),
         ({"fluids": [DAM, rts.Block((0.4, 0.4), (1, 1))]}, ["fluids.1: overlaps fluids.0; move one"]),
+        (
+            {"fluids": [rts.Sphere((0.5, 0.9), 0.2)]},
+            [
+                "fluids.0: sphere of radius 0.2 around (0.5, 0.9) leaves the domain from (0.0, 0.0) to (1.0, 1.0); move or"
+            ],
+        ),
+        ({"fluids": [rts.Sphere((0.5, 0.5, 0.5), 0.2)]}, ["fluids.0: has 3 components; the domain has 2"]),
+        (
+            {"fluids": [DROP], "spacing": 0.3},
+            ["spacing: 0.3 exceeds the radius 0.2 of fluids.0; use at most 0.2"],
+        ),
+        ({"fluids": [rts.Block((0, 0), (1, 0.51)), DROP]}, ["fluids.1: overlaps fluids.0; move one"]),
+        ({"fluids": [DROP, rts.Block((0, 0), (0.57, 0.57))]}, ["fluids.1: overlaps fluids.0; move one"]),
+        ({"fluids": [DROP, rts.Block((0.5, 0.5), (0.9, 0.9))]}, ["fluids.1: overlaps fluids.0; move one"]),
+        ({"fluids": [DROP, rts.Sphere((0.45, 0.45), 0.16)]}, ["fluids.1: overlaps fluids.0; move one"]),
+        (
+            {"fluids": [DROP, rts.Sphere((0.7, 0.26), 0.2)]},
+            ["fluids.1: lies 0.04 from fluids.0, nearer than half a spacing 0.05", "move one", "a smaller spacing"],
+        ),
+        (
+            {"body_force": rts.LinearField(((0, 1), (-1, 0))), "sound_speed": 1},
+            [
+                "body_force: gradient ((0.0, 1.0), (-1.0, 0.0)) is not symmetric",
+                "make gradient[d][e] equal gradient[e][d]",
+            ],
+        ),
+        (
+            {"body_force": rts.LinearField(((1, 0, 0), (0, 1, 0), (0, 0, 1))), "sound_speed": 1},
+            ["body_force: has 3 components; the domain has 2"],
+        ),
+        (
+            {"body_force": CENTRAL},
+            ["sound_speed: how fast the body_force makes", "give ten times the largest speed you expect [m/s]"],
+        ),
         ({"gravity": (0, 0)}, ["sound_speed: nothing falls or moves", "give it a value [m/s]"]),
         ({"spacin": 1}, ["spacin: unknown key; did you mean 'spacing'?"]),
     ],
@@ -75,6 +126,18 @@ def test_all_faults_come_at_once():
     message = complaint(fluids=blocks, spacing=0.7, gravity=(0, 0, 1))
     for part in ("gravity", "fluids.0: block", "of fluids.0", "of fluids.1", "fluids.1: overlaps", "fluids.2: has 3"):
         assert part in message
+    drops = [rts.Sphere((0, 0), 0.2), rts.Sphere((0.1, 0.1), 0.3)]
+    message = complaint(fluids=drops, spacing=0.4, body_force=rts.LinearField(((0, 1), (0, 0))))
+    for part in (
+        "body_force",
+        "sound_speed",
+        "fluids.0: sphere",
+        "radius 0.2",
+        "fluids.1: sphere",
+        "radius 0.3",
+        "overlaps",
+    ):
+        assert part in message
 
 
 @pytest.mark.parametrize("shape", [rts.Box, rts.Block])
@@ -87,15 +150,93 @@ def test_corners(shape):
         shape((0, math.nan), (1, 1))
 
 
-def test_velocity_of_a_block_has_its_dimension():
-    with pytest.raises(rts.SceneError, match="has 3 components; the block has 2"):
-        rts.Block((0, 0), (1, 1), velocity=(0, 0, 1))
+@pytest.mark.parametrize("radius", [0, -1, math.nan, math.inf])
+def test_radius_is_positive_and_finite(radius):
+    with pytest.raises(rts.SceneError, match=r"^Sphere: radius: Input should be .*\(got "):
+        rts.Sphere((0, 0), radius)
+
+
+def test_an_invalid_component_is_reported_once_and_by_name():
+    with pytest.raises(rts.SceneError) as caught:
+        rts.Block((0, math.nan), (1, 1))
+    assert str(caught.value) == "Block: lower.1: Input should be a finite number (got nan)"
+
+
+@pytest.mark.parametrize(("shape", "kind"), [(rts.Block((0, 0), (1, 1)), "block"), (rts.Sphere((0, 0), 1), "sphere")])
+def test_velocity_of_a_fluid_has_its_dimension(shape, kind):
+    with pytest.raises(rts.SceneError, match=rf"velocity \(0\.0, 0\.0, 1\.0\) has 3 components; the {kind} has 2"):
+        dataclasses.replace(shape, velocity=(0, 0, 1))
+    with pytest.raises(rts.SceneError, match=rf"velocity field has 3 components; the {kind} has 2"):
+        dataclasses.replace(shape, velocity=rts.LinearField(((0, 0, 0),) * 3))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"gradient": ((1, 0, 0), (0, 1))}, r"gradient: row 0 has 3 components; 2 rows need 2"),
+        (
+            {"gradient": ((1, 0), (0, 1)), "value": (1, 2, 3)},
+            r"value \(1.0, 2.0, 3.0\) has 3 components; the gradient has 2",
+        ),
+        (
+            {"gradient": ((1, 0), (0, 1)), "origin": (1, 2, 3)},
+            r"origin \(1.0, 2.0, 3.0\) has 3 components; the gradient has 2",
+        ),
+        ({"gradient": ((1, 0),)}, r"gradient: .*at least 2"),
+        ({"gradient": ((1, math.nan), (0, 1))}, r"gradient\.0\.1: .*finite number \(got nan\)"),
+        ({"gradient": ((1, 0), (0, 1)), "value": (math.inf, 0)}, r"value\.0: .*finite number \(got inf\)"),
+        ({"gradient": ((1, 0), (0, 1)), "orign": (0, 0)}, r"orign: unknown key; did you mean 'origin'"),
+    ],
+)
+def test_faults_of_a_linear_field(arguments, message):
+    with pytest.raises(rts.SceneError, match="^LinearField: " + message):
+        rts.LinearField(**arguments)
+
+
+def test_all_faults_of_a_linear_field_come_at_once():
+    with pytest.raises(rts.SceneError) as caught:
+        rts.LinearField(((1, 0), (0, 1, 2)), value=(1, 2, 3), origin=(0, 0, 0))
+    assert str(caught.value).count("\n") == 2
+
+
+def test_linear_field():
+    field = rts.LinearField(((1, 2), (3, 4)), value=(10, 20), origin=(1, -1))
+    assert field.at(np.array([[1, -1], [2, -1], [1, 0]])).tolist() == [[10, 20], [11, 23], [12, 24]]
+    assert rts.LinearField(((1, 2), (3, 4))).at(np.array([1, 1])).tolist() == [3, 7]
+    assert not field.is_conservative
+    force = rts.LinearField(((1, 2), (2, -4)), value=(10, 20), origin=(1, -1))
+    assert force.is_conservative
+    x, step = np.array([0.3, 0.7]), 1e-4
+    slope = [force.potential(x - e) - force.potential(x + e) for e in step * np.eye(2)]
+    assert np.array(slope) / (2 * step) == pytest.approx(force.at(x), rel=1e-9)
+    assert force.potential(np.array([1, -1])) == 0
+
+
+def test_volume_and_reach_of_shapes():
+    assert rts.Sphere((1, 2), 3).volume == pytest.approx(28.274333882308138)
+    assert rts.Sphere((1, 2, 3), 3).volume == pytest.approx(113.09733552923255)
+    assert rts.Sphere((1, 2), 3).reach((3, 4)) == pytest.approx(11 + 15)
+    assert rts.Box((1, 2), (3, 5)).reach((-1, 2)) == rts.Block((1, 2), (3, 5)).reach((-1, 2)) == 9
+
+
+def test_separation_of_spheres_and_blocks():
+    ball, block = rts.Sphere((0, 0), 1), rts.Block((3, 4), (6, 6))
+    assert separation(ball, block) == separation(block, ball) == 4.0
+    assert separation(rts.Sphere((4, 5), 1), block) == -1.0
+    assert separation(ball, rts.Sphere((3, 4), 2)) == 2.0
+    assert separation(block, rts.Block((6, 0), (7, 5))) == 0.0
+    assert separation(block, rts.Block((5, 0), (7, 4.5))) == -0.5
 
 
 def test_blocks_may_touch_each_other_and_the_walls():
     third = 1 / 3
     assert scene(fluids=[rts.Block((0, 0), (third, 1)), rts.Block((third, 0), (1, 1))]).dim == 2
     assert scene(fluids=[rts.Block((0, 0), (0.1 + 0.2, 0.3)), rts.Block((0.3, 0), (1, 0.3))]).dim == 2
+
+
+def test_a_sphere_may_touch_a_block_and_a_wall():
+    resting = [rts.Block((0, 0), (1, 0.1 + 0.2)), rts.Sphere((0.2, 0.5), 0.2), rts.Sphere((0.65, 0.5), 0.2)]
+    assert scene(fluids=resting).dim == 2
 
 
 def test_scene_is_frozen_and_replace_validates():
@@ -129,6 +270,19 @@ def test_largest_speed_is_that_of_the_longest_fall():
     assert scene(fluids=[thrown], gravity=(0, 0)).estimate_max_speed() == pytest.approx(5.0)
 
 
+def test_largest_speed_of_spheres_and_linear_fields():
+    assert scene(fluids=[DAM, DROP]).estimate_max_speed() == pytest.approx(math.sqrt(2 * 9.81 * 0.9))
+    sideways = scene(fluids=[DROP], gravity=(-3, -4)).estimate_max_speed()
+    assert sideways == pytest.approx(math.sqrt(2 * (0.7 * 7 + 0.2 * 5)))
+    stretch = rts.LinearField(((-3, 0), (0, 4)), value=(0, -1), origin=(0.7, 0.7))
+    drop = rts.Sphere((0.7, 0.7), 0.2, velocity=stretch)
+    assert scene(fluids=[drop], gravity=(0, 0)).estimate_max_speed() == pytest.approx(math.hypot(0.6, 1.8))
+    block = rts.Block((0.5, 0.5), (0.6, 0.8), velocity=stretch)
+    assert scene(fluids=[block], gravity=(0, 0)).wave_speed == pytest.approx(10 * math.hypot(0.6, 1.8))
+    assert scene(fluids=[drop]).estimate_max_speed() == pytest.approx(math.sqrt(0.36 + 3.24 + 2 * 9.81 * 0.9))
+    assert scene(body_force=CENTRAL, sound_speed=7).wave_speed == 7.0
+
+
 def test_toml_file(tmp_path):
     path = write(tmp_path, TOML)
     loaded = rts.load_scene(path)
@@ -148,6 +302,54 @@ def test_faults_in_a_file_name_the_file_and_the_path(tmp_path):
     assert "sound_sped: unknown key; did you mean 'sound_speed'?" in message
     assert "fluids.0.uper: unknown key; did you mean 'upper'?" in message
     assert "fluids.0.upper: missing" in message
+
+
+def test_toml_file_with_a_sphere(tmp_path):
+    loaded = rts.load_scene(write(tmp_path, SPHERES))
+    drop = rts.Sphere((0.7, 0.7), 0.2, velocity=rts.LinearField(((-100, 0), (0, 100))))
+    assert loaded.fluids == (rts.Block((0, 0), (0.5, 0.4)), drop)
+    finer = rts.load_scene(write(tmp_path, SPHERES), particles=1000)
+    assert (0.2 + math.pi * 0.04) / finer.spacing**2 == pytest.approx(1000, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "lines"),
+    [
+        ("radius = 0.2", "radius = -0.2", ["fluids.1.radius: Input should be greater than 0 (got -0.2)"]),
+        ("radius = 0.2", "", ["fluids.1.radius: missing; give it a value"]),
+        (
+            "radius",
+            "radus",
+            ["fluids.1.radius: missing; give it a value", "fluids.1.radus: unknown key; did you mean 'radius'?"],
+        ),
+        (
+            "centre",
+            "center",
+            ["fluids.1.centre: missing; give it a value", "fluids.1.center: unknown key; did you mean 'centre'?"],
+        ),
+        (
+            "gradient",
+            "gradent",
+            ["velocity.gradient: missing", "velocity.gradent: unknown key; did you mean 'gradient'?"],
+        ),
+        ("[[-100.0, 0.0], [0.0, 100.0]]", "[[1, 'x'], [0, 1]]", ["fluids.1.velocity.gradient.0.1: Input should be a"]),
+        ("{ gradient = [[-100.0, 0.0], [0.0, 100.0]] }", "[1, 'x']", ["fluids.1.velocity.1: Input should be a valid"]),
+        (
+            "{ gradient = [[-100.0, 0.0], [0.0, 100.0]] }",
+            "3",
+            ["fluids.1.velocity: Input should be a valid tuple (got 3)"],
+        ),
+        ("{ gradient = [[-100.0, 0.0], [0.0, 100.0]] }", "[1, 2, 3]", ["fluids.1: velocity (1.0, 2.0, 3.0) has 3"]),
+        ("spacing = 0.1", "spacing = 0.1\nbody_forc = 1", ["body_forc: unknown key; did you mean 'body_force'?"]),
+    ],
+)
+def test_a_mistake_in_a_sphere_is_reported_once(tmp_path, old, new, lines):
+    with pytest.raises(rts.SceneError) as caught:
+        rts.load_scene(write(tmp_path, SPHERES.replace(old, new)))
+    message = str(caught.value)
+    assert message.count("\n") == len(lines) - 1
+    for line in lines:
+        assert line in message
 
 
 def test_unreadable_files(tmp_path):
@@ -171,11 +373,12 @@ def test_unknown_scene_lists_the_known_ones():
 def test_built_in_scenes_load_in_both_dimensions():
     required = "dam_break double_dam_break dam_break_drop serna_ablation martin_moyce still_pool free_fall"
     names = rts.scene_names()
-    assert set(required.split()) | {"dam_break_2d", "double_dam_break_2d"} <= set(names)
+    drops = {"elliptical_drop", "oscillating_drop"}
+    assert set(required.split()) | drops | {"dam_break_2d", "double_dam_break_2d"} <= set(names)
     for name in names:
         loaded = rts.load_scene(name)
         assert loaded.name == name
-        assert loaded.dim == (2 if name.endswith("_2d") else 3)
+        assert loaded.dim == (2 if name.endswith("_2d") or name in drops else 3)
         assert loaded.description
 
 
@@ -185,6 +388,10 @@ def test_plain_data_survives_a_round_trip():
     data["fluids"] = [rts.Block(**block) for block in data["fluids"]]
     data["view"] = rts.View(**data["view"])
     assert rts.Scene(**data) == rts.load_scene("dam_break_drop")
+    for name in ("elliptical_drop", "oscillating_drop"):
+        data = rts.load_scene(name).to_dict()
+        assert data["fluids"][0]["velocity"].keys() == {"gradient"}
+        assert scene_from(json.loads(json.dumps(data))) == rts.load_scene(name)
 
 
 @pytest.mark.parametrize(

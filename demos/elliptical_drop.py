@@ -1,0 +1,12 @@
+"""A disc of water stretches into an ellipse (Monaghan 1994), in two dimensions: its axes are known.
+
+Takes every option of `taichi-rts run`, e.g. --arch cuda --particles 300k --stepper uniform.
+"""
+
+from taichi_rts.cli import run_demo
+
+SCENE = "elliptical_drop"
+EXPORT_FPS = 5000.0  # frames per second of physical time
+
+if __name__ == "__main__":
+    run_demo(SCENE, export_fps=EXPORT_FPS)

@@ -1,0 +1,236 @@
+"""Where fluid is at the start and how it moves there: boxes, blocks, spheres, and fields that are linear in space."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+import numpy as np
+from annotated_types import Len
+from pydantic import Discriminator, Tag, model_validator
+from pydantic.dataclasses import dataclass
+
+from taichi_rts.errors import SceneError
+from taichi_rts.validation import FROZEN, Positive, Vector, validated
+
+
+@validated(SceneError)
+@dataclass(frozen=True, config=FROZEN)
+class Box:
+    """An axis-aligned box between two corners: `lower` and `upper` [m], (dim,) each."""
+
+    lower: Vector
+    upper: Vector
+
+    @model_validator(mode="after")
+    def _check(self) -> Box:
+        _check_corners(self.lower, self.upper)
+        return self
+
+    @property
+    def size(self) -> tuple[float, ...]:
+        """Edge lengths [m], (dim,)."""
+        return tuple(b - a for a, b in zip(self.lower, self.upper, strict=True))
+
+    def reach(self, direction: Vector) -> float:
+        """Largest value of direction.x over the box; `direction` is (dim,)."""
+        return sum(max(d * a, d * b) for d, a, b in zip(direction, self.lower, self.upper, strict=True))
+
+
+@validated(SceneError)
+@dataclass(frozen=True, config=FROZEN)
+class LinearField:
+    """The vector field value + gradient . (x - origin).
+
+    Attributes:
+        gradient: derivative of component d along e in row d and column e [1/s for a velocity, 1/s^2 for an acceleration].
+        value: the field at `origin`, (dim,); None: 0.
+        origin: [m], (dim,); None: 0.
+    """
+
+    gradient: Annotated[tuple[Vector, ...], Len(2, 3)]
+    value: Vector | None = None
+    origin: Vector | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> LinearField:
+        faults = [
+            f"gradient: row {k} has {len(row)} components; {self.dim} rows need {self.dim}"
+            for k, row in enumerate(self.gradient)
+            if len(row) != self.dim
+        ]
+        for name, vector in (("value", self.value), ("origin", self.origin)):
+            if vector is not None and len(vector) != self.dim:
+                faults.append(f"{name} {vector} has {len(vector)} components; the gradient has {self.dim}")
+        if faults:
+            raise ValueError("\n  ".join(faults))
+        return self
+
+    @property
+    def dim(self) -> int:
+        """Number of space dimensions, 2 or 3."""
+        return len(self.gradient)
+
+    @property
+    def base(self) -> tuple[Vector, Vector]:
+        """`origin` and `value`, (dim,) each, with the defaults filled in."""
+        zero = (0.0,) * self.dim
+        return self.origin or zero, self.value or zero
+
+    @property
+    def is_conservative(self) -> bool:
+        """Whether the field has a potential: its gradient is symmetric."""
+        gradient = np.array(self.gradient)
+        return bool(np.abs(gradient - gradient.T).max() <= 1e-9 * np.abs(gradient).max())
+
+    def at(self, x: np.ndarray) -> np.ndarray:
+        """Values (..., dim) at positions `x` [m], (..., dim)."""
+        origin, value = self.base
+        return np.asarray(value) + (np.asarray(x) - origin) @ np.array(self.gradient).T
+
+    def potential(self, x: np.ndarray) -> np.ndarray:
+        """-(value.y + y.gradient.y / 2), (...), at positions `x` [m], (..., dim), y = x - origin: the field is -grad of it."""
+        origin, value = self.base
+        y = np.asarray(x) - origin
+        return -(y @ np.asarray(value) + 0.5 * (y @ np.array(self.gradient) * y).sum(axis=-1))
+
+
+def _velocity_tag(data: Any) -> str:
+    return "<field>" if isinstance(data, dict | LinearField) else "<vector>"
+
+
+Velocity = Annotated[
+    Annotated[Vector, Tag("<vector>")] | Annotated[LinearField, Tag("<field>")], Discriminator(_velocity_tag)
+]
+
+
+@validated(SceneError)
+@dataclass(frozen=True, config=FROZEN)
+class Block:
+    """A block of fluid between two corners `lower` and `upper` [m], (dim,).
+
+    It moves at `velocity` [m/s]: a vector (dim,) or a `LinearField`; None: at rest.
+    """
+
+    lower: Vector
+    upper: Vector
+    velocity: Velocity | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Block:
+        _check_corners(self.lower, self.upper)
+        _check_velocity(self.velocity, len(self.lower), "block")
+        return self
+
+    @property
+    def volume(self) -> float:
+        """Volume [m^3] (area [m^2] in two dimensions)."""
+        return math.prod(b - a for a, b in zip(self.lower, self.upper, strict=True))
+
+    @property
+    def outline(self) -> str:
+        """Where it is, for messages."""
+        return f"block from {self.lower} to {self.upper}"
+
+    def reach(self, direction: Vector) -> float:
+        """Largest value of direction.x over the block; `direction` is (dim,)."""
+        return Box(self.lower, self.upper).reach(direction)
+
+
+@validated(SceneError)
+@dataclass(frozen=True, config=FROZEN)
+class Sphere:
+    """A sphere of fluid, in two dimensions a disc, around `centre` [m], (dim,), with `radius` [m].
+
+    It moves at `velocity` [m/s]: a vector (dim,) or a `LinearField`; None: at rest.
+    """
+
+    centre: Vector
+    radius: Positive
+    velocity: Velocity | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Sphere:
+        _check_velocity(self.velocity, len(self.centre), "sphere")
+        return self
+
+    @property
+    def lower(self) -> Vector:
+        """Lower corner [m], (dim,), of the bounding box."""
+        return tuple(x - self.radius for x in self.centre)
+
+    @property
+    def upper(self) -> Vector:
+        """Upper corner [m], (dim,), of the bounding box."""
+        return tuple(x + self.radius for x in self.centre)
+
+    @property
+    def volume(self) -> float:
+        """Volume [m^3] (area [m^2] in two dimensions)."""
+        return math.pi * self.radius**2 if len(self.centre) == 2 else 4.0 / 3.0 * math.pi * self.radius**3
+
+    @property
+    def outline(self) -> str:
+        """Where it is, for messages."""
+        return f"sphere of radius {self.radius} around {self.centre}"
+
+    def reach(self, direction: Vector) -> float:
+        """Largest value of direction.x over the sphere; `direction` is (dim,)."""
+        return sum(d * x for d, x in zip(direction, self.centre, strict=True)) + self.radius * math.hypot(*direction)
+
+
+def _fluid_tag(data: Any) -> str:
+    is_sphere = isinstance(data, Sphere) or (isinstance(data, dict) and bool({"centre", "radius"} & data.keys()))
+    return "<sphere>" if is_sphere else "<block>"
+
+
+Fluid = Annotated[Annotated[Block, Tag("<block>")] | Annotated[Sphere, Tag("<sphere>")], Discriminator(_fluid_tag)]
+"""A block, or a sphere if it has a centre or a radius: a mistake in one is not reported for the other as well."""
+
+
+def velocities(fluid: Block | Sphere, x: np.ndarray) -> np.ndarray:
+    """Velocities [m/s], (N, dim), of a fluid's particles at `x` [m], (N, dim)."""
+    if isinstance(fluid.velocity, LinearField):
+        return fluid.velocity.at(x)
+    return np.tile(np.asarray(fluid.velocity or (0.0,) * x.shape[1]), (len(x), 1))
+
+
+def top_speed(fluid: Block | Sphere) -> float:
+    """Largest speed [m/s] in a fluid's bounding box: of a linear field it is convex, so it is that of a corner."""
+    return float(np.linalg.norm(velocities(fluid, np.array(corners(fluid))), axis=1).max())
+
+
+def corners(shape: Box | Block | Sphere) -> list[Vector]:
+    """Corners [m] of the bounding box, 2^dim of (dim,)."""
+    found: list[Vector] = [()]
+    for a, b in zip(shape.lower, shape.upper, strict=True):
+        found = [(*corner, x) for corner in found for x in (a, b)]
+    return found
+
+
+def separation(one: Block | Sphere, two: Block | Sphere) -> float:
+    """A length [m] that is negative if the two overlap; if one is a sphere, the distance of what does not."""
+    if isinstance(one, Block) and isinstance(two, Block):
+        sides = zip(one.lower, one.upper, two.lower, two.upper, strict=True)
+        return max(max(c - b, a - d) for a, b, c, d in sides)
+    if isinstance(one, Sphere) and isinstance(two, Sphere):
+        return math.dist(one.centre, two.centre) - one.radius - two.radius
+    sphere, block = (one, two) if isinstance(one, Sphere) else (two, one)
+    assert isinstance(sphere, Sphere)  # for mypy
+    nearest = [min(max(x, a), b) for x, a, b in zip(sphere.centre, block.lower, block.upper, strict=True)]
+    return math.dist(sphere.centre, nearest) - sphere.radius
+
+
+def _check_corners(lower: Vector, upper: Vector) -> None:
+    if len(lower) != len(upper):
+        raise ValueError(f"lower {lower} and upper {upper} differ in dimension; give both 2 or both 3 components")
+    if not all(a < b for a, b in zip(lower, upper, strict=True)):
+        raise ValueError(f"upper {upper} must exceed lower {lower} in every component")
+
+
+def _check_velocity(velocity: Vector | LinearField | None, dim: int, kind: str) -> None:
+    if velocity is None:
+        return
+    size, text = (velocity.dim, "field") if isinstance(velocity, LinearField) else (len(velocity), str(velocity))
+    if size != dim:
+        raise ValueError(f"velocity {text} has {size} components; the {kind} has {dim}")
