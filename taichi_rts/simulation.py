@@ -31,10 +31,11 @@ COUNTER_LIMIT = 2**30  # counts on the device are 32-bit; they are collected bef
 class Simulation:
     """A scene, a stepper, and the state in between.
 
-    Call `taichi_rts.init` first. Building one compiles its kernels and evaluates the first forces.
+    Call `taichi_rts.init` first. Building one compiles its kernels and evaluates the first forces. With `debug` the stepper
+    checks at every step what is true by construction, and raises `AssertionError` where it is not.
     """
 
-    def __init__(self, scene: Scene, stepper: Stepper | None = None) -> None:
+    def __init__(self, scene: Scene, stepper: Stepper | None = None, *, debug: bool = False) -> None:
         backend = backends.current()
         self.scene = scene
         self.stepper = stepper if stepper is not None else cast(Stepper, Regional())
@@ -70,6 +71,7 @@ class Simulation:
             self.medium,
         )
         self.schedule = self.stepper.schedule(scene, self.particles, self.grid, self.timeline)
+        self.schedule.debug = debug
 
         self.overhead = Overhead(self.particles.count)
         self._tally = Tally(self.particles.count, self.schedule.levels)

@@ -168,11 +168,13 @@ class AsynchronousSchedule(Schedule):
         self.passes = ti.field(ti.i32, ())
         self.widths = ti.field(ti.i32, LOG)
         self.wakes = ti.field(ti.i32, ())
+        self.extrapolated = ti.field(ti.i32, ())
         self.updates = ti.field(ti.i32, self.levels + 1)
         self.target = 0
         self.cycle_end = self.cycle_length()
         self.cycles = 1
         self.launched = 0
+        self.blind = self.in_cycle = 0
         self.seen_widths: list[np.ndarray] = []
 
     # -- what the host decides: cycles ------------------------------------------------------------------------------
@@ -180,16 +182,26 @@ class AsynchronousSchedule(Schedule):
     def begin(self, timeline: Timeline, target: int) -> bool:
         """Return True while some cell's time is not after tick `target`; starts a new cycle where one is over."""
         self.target = target
+        if self.blind > 0 and not self.debug:
+            self.blind -= 1
+            return self.launch(False)
         youngest = int(self.youngest[None])
         if youngest > target:
             self.steps = max(self.steps, target)
             return False
-        self.needs_sorting = youngest >= self.cycle_end
-        if self.needs_sorting:
-            timeline.now = self.steps = youngest
-            length = self.cycle_length()
-            self.cycle_end = (timeline.now // length + 1) * length
-            self.cycles += 1
+        if youngest < self.cycle_end:
+            return self.launch(False)
+        timeline.now = self.steps = youngest
+        length = self.cycle_length()
+        self.cycle_end = (timeline.now // length + 1) * length
+        self.cycles += 1
+        self.blind, self.in_cycle = max(0, self.in_cycle - 2), 0
+        return self.launch(True)
+
+    def launch(self, needs_sorting: bool) -> bool:
+        """Note that a pass begins. All but the last few of a cycle are launched blindly; idle ones would change nothing."""
+        self.needs_sorting = needs_sorting
+        self.in_cycle += 1
         self.launched += 1
         if self.launched == LOG:
             self.collect_widths()
@@ -280,6 +292,8 @@ class AsynchronousSchedule(Schedule):
         self.due_scan.run()
         self.list_due()
         self.mark_read(now)
+        if self.debug:
+            self.check(now)
 
     @ti.kernel
     def find_ready(self, target: ti.i32, cycle_end: ti.i32):
@@ -346,6 +360,27 @@ class AsynchronousSchedule(Schedule):
             for stride in ti.static(self.grid.geometry.neighbour_strides):
                 due = ti.max(due, self.block_due[block + stride])
             self.read_at[block] = self.claim[block] - now if due > 0 else -1
+
+    def check(self, now: int) -> None:
+        """Debug runs: raise `AssertionError` for a pass in which nobody steps or somebody is extrapolated."""
+        self.count_extrapolated(now)
+        assert int(self.stepping[None]) > 0, f"no cell may step at tick {int(self.youngest[None])}"
+        assert int(self.extrapolated[None]) == 0, f"particles extrapolated near tick {int(self.youngest[None])}"
+
+    @ti.kernel
+    def count_extrapolated(self, now: ti.i32):
+        """Count reads after the end of a particle's step or before its evaluation before the last."""
+        for m in range(self.occupied_count[None]):
+            block = self.occupied[m]
+            if self.read_at[block] >= 0:
+                time = now + self.read_at[block]
+                for k in range(self.grid.first(block), self.grid.first(block + 1)):
+                    i = self.grid.order[k]
+                    begin = self.particles.updated[i]
+                    if ti.static(self.particles.has_past):
+                        begin = ti.min(begin, self.particles.past_updated[i])
+                    if time > self.end(i) or time < begin:
+                        self.extrapolated[None] += 1
 
     # -- after the evaluation: the next steps -----------------------------------------------------------------------
 
@@ -492,4 +527,5 @@ class AsynchronousSchedule(Schedule):
             "cells_per_pass": {"min": int(some.min()), "median": float(np.median(some)), "max": int(some.max())},
             "cycles": self.cycles,
             "wakes": int(self.wakes[None]),
+            "extrapolations": int(self.extrapolated[None]) if self.debug else None,
         }

@@ -54,6 +54,7 @@ class Schedule:
         levels: number of levels; level n steps every n base steps.
         needs_sorting: whether the grid has to be sorted before the present step.
         steps: base steps begun so far.
+        debug: check at run time what is true by construction.
     """
 
     levels = 1
@@ -67,6 +68,7 @@ class Schedule:
         self.due_count = ti.field(ti.i32, ())
         self.read_at = ti.field(ti.i32, grid.geometry.blocks)
         self.steps = 0
+        self.debug = False
 
     def begin(self, timeline: Timeline, target: int) -> bool:
         """Set the clock to the next step and return True, unless that step ends after tick `target`.

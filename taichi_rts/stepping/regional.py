@@ -1,5 +1,6 @@
 """Regional time stepping (Goswami & Batty 2014): every block of side r steps at n base steps."""
 
+import math
 from typing import Annotated, Any, ClassVar, Literal
 
 import taichi as ti
@@ -14,7 +15,7 @@ from taichi_rts.scan import ExclusiveScan
 from taichi_rts.scene import Positive, Scene
 from taichi_rts.stepping import criteria
 from taichi_rts.stepping.base import Courant, Schedule
-from taichi_rts.stepping.limiter import BlockLimiter
+from taichi_rts.stepping.limiter import BlockLimiter, NeighbourLimiter
 from taichi_rts.stepping.timeline import Timeline
 from taichi_rts.validation import FROZEN, validated
 
@@ -23,16 +24,15 @@ LARGEST_COURANT = 0.4
 uniform steps. Still pools stay calm up to 0.6 on average, though single ones differ by 40 %; at 0.7 they move twice as much,
 at 0.8 they simmer (`docs/defaults.md`)."""
 
-
-def _default_courant(levels: int) -> float:
-    return LARGEST_COURANT / levels
-
-
 PRESETS: dict[str | None, dict[str, Any]] = {
     None: {"levels": 2, "strict_cfl": False, "lambda_f": 0.1},
-    "paper": {"courant": 0.4, "levels": 3, "strict_cfl": False, "lambda_f": 0.1},
+    "paper": {"courant": 0.4, "levels": 3, "strict_cfl": False, "lambda_f": 0.1, "limiter": False},
 }
 """The paper asks for lambda_f <= 0.25. At 0.25 a double dam break gains 2.2 % of energy, at 0.1 0.1 % (docs/defaults.md)."""
+FROM_LEVELS: dict[str, Any] = {
+    "courant": lambda levels: LARGEST_COURANT / levels,
+    "limiter": lambda levels: levels > 2,  # with two levels it changes nothing but the work (docs/asynchronous.md)
+}
 
 
 @validated(StepperError)
@@ -51,6 +51,9 @@ class Regional:
         alpha, beta, beta_decay: Eq. 3, with beta_n = beta * beta_decay^(n-2).
         lambda_f: Eq. 2, at most 0.25 in the paper; None: 0.1.
         grading: let the levels of neighbouring blocks differ by at most one (R_min alone leaves jumps from 1 to 3).
+        limiter: the neighbour limiter: no block's step exceeds twice a neighbour's, and steps grow by one level at a time, when
+            synchronised. (Waking needs none: line 12 re-evaluates whoever's block has another step.) None: on from three
+            levels up, off in the paper's preset.
         inactive_density: what due particles read of others: "stale" (of the last evaluation) or "extrapolated".
     """
 
@@ -64,6 +67,7 @@ class Regional:
     beta_decay: Annotated[float, Field(gt=0, le=1)] = 0.2
     lambda_f: Positive | None = None
     grading: bool = False
+    limiter: bool | None = None
     inactive_density: Literal["stale", "extrapolated"] = "stale"
 
     name: ClassVar[str] = "regional"
@@ -75,7 +79,7 @@ class Regional:
         value = getattr(self, key)
         if value is None:
             value = PRESETS[self.preset].get(key)
-        return _default_courant(self.resolved("levels")) if value is None else value
+        return FROM_LEVELS[key](self.resolved("levels")) if value is None else value
 
     @property
     def extrapolates_density(self) -> bool:
@@ -118,8 +122,12 @@ class RegionalSchedule(Schedule):
         self.blocks = blocks
         self.raw_level = ti.field(ti.i32, blocks)
         self.block_level = ti.field(ti.i32, blocks)
-        self.limiter = BlockLimiter(grid.geometry)
+        self.beside = BlockLimiter(grid.geometry)
+        self.limits = stepper.resolved("limiter")
+        self.limiter = NeighbourLimiter(doubling=False)
+        self.ratio_sweeps = max(0, math.ceil(math.log2(self.levels)) - 1) if self.limits else 0
         self.grading_sweeps = max(0, self.levels - 2) if stepper.grading else 0
+        self.block_level.fill(BlockLimiter.EMPTY)
         self.flag = ti.field(ti.i32, particles.count)
         self.block_due = ti.field(ti.i32, blocks)
         self.due_start = ti.field(ti.i32, blocks + 1)
@@ -149,7 +157,16 @@ class RegionalSchedule(Schedule):
                 v = self.particles.v[i] + a * (ti.cast(now - self.particles.updated[i], float) * tick)
                 speed2 = ti.max(speed2, v.norm_sqr())
                 acceleration2 = ti.max(acceleration2, a.norm_sqr())
-            self.raw_level[block] = self.region(tick, speed2, acceleration2) if first < end else BlockLimiter.EMPTY
+            level = BlockLimiter.EMPTY
+            if first < end:
+                level = self.region(tick, speed2, acceleration2)
+                if ti.static(self.limits):
+                    before = self.block_level[
+                        block
+                    ]  # of the last step; a block that was empty has nothing to grow from
+                    if before != BlockLimiter.EMPTY:
+                        level = self.limiter.settled(level, before, now)
+            self.raw_level[block] = level
 
     @ti.func
     def region(self, base_step, speed2, acceleration2):
@@ -163,11 +180,11 @@ class RegionalSchedule(Schedule):
         return level
 
     def apply_minimum_region(self) -> None:
-        """R_min of Section 3, then the sweeps of grading."""
-        self.limiter.limit(self.raw_level, self.block_level, 1, 0)
-        for _ in range(self.grading_sweeps):
-            self.limiter.limit(self.block_level, self.raw_level, 1, 1)
-            self.limiter.limit(self.raw_level, self.block_level, 1, 1)
+        """R_min of Section 3, then the sweeps of the limiter and of grading, which spread by a block each."""
+        self.beside.limit(self.raw_level, self.block_level, 1, 0)
+        for factor, jump in self.ratio_sweeps * [(NeighbourLimiter.RATIO, 0)] + self.grading_sweeps * [(1, 1)]:
+            self.beside.limit(self.block_level, self.raw_level, factor, jump)
+            self.beside.limit(self.raw_level, self.block_level, factor, jump)
 
     @ti.kernel
     def update_validity(self, now: ti.i32):
