@@ -7,6 +7,8 @@ import numpy as np
 import taichi_rts as rts
 
 FALL_VELOCITY = (0.1, -0.5)
+THROW = (1.0, 0.5)
+STRAIN = rts.LinearField(((-4.0, 0.0), (0.0, 4.0)), value=THROW, origin=(0.4, 0.5))
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,7 @@ PROBLEMS = {
         ),
         0.08,
     ),
+    "drop_in_flight": Problem(tank_2d(rts.Sphere((0.4, 0.5), 0.25, velocity=STRAIN)), 0.12),
 }
 
 STEPPERS = {
@@ -47,6 +50,8 @@ STEPPERS = {
     "regional": rts.Regional(),
     "regional_paper": rts.Regional(preset="paper"),
     "regional_graded": rts.Regional(levels=5, courant=0.2, grading=True, inactive_density="extrapolated"),
+    "asynchronous": rts.Asynchronous(),
+    "asynchronous_integers": rts.Asynchronous(steps="integers", levels=16, stagger=1),
 }
 
 
@@ -58,12 +63,14 @@ class Record:
     states: list = field(default_factory=list)
     energies: list = field(default_factory=list)
     momenta: list = field(default_factory=list)
+    ends: list = field(default_factory=list)
+    cells: list = field(default_factory=list)
     statistics: dict = field(default_factory=dict)
 
 
 def record(problem, stepper):
     """Run a problem in pieces that end at odd times, and keep all that can be seen from outside."""
-    sim = rts.Simulation(problem.scene, stepper)
+    sim = rts.Simulation(problem.scene, stepper, debug=True)
     seen = Record(problem, sim.base_step)
     for time in np.linspace(0, problem.end_time, problem.pieces + 1):
         sim.advance_to(time)
@@ -71,8 +78,28 @@ def record(problem, stepper):
         seen.states.append(sim.state())
         seen.energies.append(sim.energy().total)
         seen.momenta.append(sim.momentum())
+        seen.ends.append(by_id(sim, sim.particles.updated, sim.particles.level))
+        if stepper.name == "asynchronous":
+            seen.cells.append(lead_of_neighbours(sim))
     seen.statistics = sim.statistics
     return seen
+
+
+def by_id(sim, *fields):
+    """Values of fields, stacked, in order of particle id."""
+    order = np.argsort(sim.particles.identity.to_numpy())
+    return np.stack([field.to_numpy()[order] for field in fields])
+
+
+def lead_of_neighbours(sim):
+    """Largest number of ticks by which a cell is ahead of a neighbour, and the youngest cell's time."""
+    time, empty = sim.schedule.time.to_numpy().astype(np.int64), sim.schedule.EMPTY
+    ahead = 0
+    for stride in sim.grid.geometry.neighbour_strides:
+        other = np.roll(time, -stride)
+        both = (time < empty) & (other < empty)
+        ahead = max(ahead, (time - other)[both].max(initial=0))
+    return ahead, time.min()
 
 
 def blocks_with_levels(scene, x, levels):

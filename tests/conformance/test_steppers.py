@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from problems import FALL_VELOCITY, PROBLEMS, STEPPERS, around, blocks_with_levels, record
+from problems import FALL_VELOCITY, PROBLEMS, STEPPERS, THROW, around, blocks_with_levels, record
 
 import taichi_rts as rts
 
@@ -49,7 +49,8 @@ def test_time_is_exactly_what_was_asked_for(runs, name):
 @every_problem
 def test_work_is_counted(runs, stepper, name):
     run, counts = runs[name], runs[name].statistics
-    levels = STEPPERS[stepper].resolved("levels") if isinstance(STEPPERS[stepper], rts.Regional) else 1
+    kind = STEPPERS[stepper]
+    levels = kind.resolved("levels") if isinstance(kind, rts.Regional) else getattr(kind, "levels", 1)
     assert len(counts["level_fractions"]) == levels
     assert sum(counts["level_fractions"]) == pytest.approx(1.0, abs=1e-12)
     particles = len(run.states[0][0])
@@ -86,8 +87,44 @@ def test_momentum_of_a_head_on_collision(runs, stepper):
     assert np.abs(v[:, 1]).max() > 1.0  # and the fluid escapes sideways
 
 
+def test_a_drop_in_flight_keeps_its_momentum(runs, stepper):
+    run = runs["drop_in_flight"]
+    mass = np.pi * 0.25**2 * 1000.0
+    drift = [
+        momentum - run.momenta[0] - np.array([0, -9.81]) * time * run.momenta[0][0] / THROW[0]
+        for (time, _), momentum in zip(run.times, run.momenta, strict=True)
+    ]
+    size = np.abs(drift).max() / (mass * 1.0)  # of the momentum of one half against the other, 4/s at 0.25 m
+    assert size < (1e-12 if stepper.startswith("uniform") else 0.01)  # partners are evaluated at different times
+
+
+@every_problem
+def test_time_never_goes_back(runs, name):
+    updated = np.array([ends[0] for ends in runs[name].ends])
+    ends = np.array([sum(ends) for ends in runs[name].ends])
+    assert (np.diff(updated, axis=0) >= 0).all()
+    assert (ends >= updated).all()
+    assert updated[-1].min() > 0  # everybody has come along
+
+
+@every_problem
+def test_cells_are_at_most_a_step_ahead_of_their_neighbours(runs, stepper, name):
+    if not stepper.startswith("asynchronous"):
+        pytest.skip("cells have times of their own only with asynchronous steps")
+    run = runs[name]
+    assert max(ahead for ahead, _ in run.cells) <= STEPPERS[stepper].levels
+    youngest = [youngest for _, youngest in run.cells]
+    assert (np.diff(youngest) >= 0).all()
+    for (time, _), ends in zip(run.times, youngest, strict=True):
+        assert ends * run.base_step > time * (1 - 1e-12)
+    assert run.statistics["extrapolations"] == 0
+    assert run.statistics["cells_per_pass"]["min"] >= 1
+
+
 @every_problem
 def test_neighbouring_blocks_obey_the_limiter(runs, stepper, name):
+    if not stepper.startswith(("uniform", "regional")):
+        pytest.skip("cells of asynchronous steps are bounded pass by pass: tests/unit/test_asynchronous_schedule.py")
     graded = stepper == "regional_graded"
     for x, _, _, level in runs[name].states[1:]:
         found = blocks_with_levels(PROBLEMS[name].scene, x, level)
@@ -105,7 +142,8 @@ def test_neighbouring_blocks_obey_the_limiter(runs, stepper, name):
 
 def test_output_times_do_not_change_the_run(start_taichi, quick, runs, stepper):
     name = "dam_break_2d"
-    options = {"cpu_max_num_threads": 1} if stepper == "regional_paper" else {}  # nor does the number of threads
+    one_thread = stepper in ("regional_paper", "asynchronous_integers")
+    options = {"cpu_max_num_threads": 1} if one_thread else {}  # nor does the number of threads
     with start_taichi("cpu", "f64", **quick, **options):
         sim = rts.Simulation(PROBLEMS[name].scene, STEPPERS[stepper])
         sim.advance_to(PROBLEMS[name].end_time)
@@ -123,11 +161,12 @@ def test_output_times_do_not_change_the_run(start_taichi, quick, runs, stepper):
 @pytest.mark.parametrize("name", ["dam_break_2d", "dam_break_3d"])
 def test_one_level_equals_uniform_bit_for_bit(start_taichi, name):
     states = []
-    for same in (rts.Uniform(), rts.Regional(levels=1)):
+    for same in (rts.Uniform(), rts.Regional(levels=1), rts.Asynchronous(levels=1)):
         with start_taichi("cpu", "f64"):
             sim = rts.Simulation(PROBLEMS[name].scene, same)
             sim.advance_to(520.5 * sim.base_step)
             assert sim.statistics["base_steps"] == 520
             states.append(sim.state())
-    for uniform, regional in zip(*states, strict=True):
-        assert uniform.tobytes() == regional.tobytes()
+    for uniform, *others in zip(*states, strict=True):
+        for other in others:
+            assert uniform.tobytes() == other.tobytes()
