@@ -388,7 +388,8 @@ class AsynchronousSchedule(Schedule):
         """Give the cells that stepped their next step, and wake neighbours whose step is too long beside it."""
         self.propose_steps(now, tick)
         self.assign_steps()
-        self.end_steps(now)
+        self.wake_neighbours(now)
+        self.read_changed_cells()
         self.log_pass()
         self.find_youngest()
 
@@ -471,19 +472,25 @@ class AsynchronousSchedule(Schedule):
                 self.step[block] = step
 
     @ti.kernel
-    def end_steps(self, now: ti.i32):
-        """Wake cells beside a much shorter step: their steps end early; then every cell concerned takes its new time."""
-        for m in range(self.occupied_count[None]):
-            block = self.occupied[m]
-            if self.read_at[block] >= 0:
-                if ti.static(self.stepper.limiter):
+    def wake_neighbours(self, now: ti.i32):
+        """Wake cells beside one that has just begun a much shorter step: theirs end early."""
+        if ti.static(self.stepper.limiter):
+            for m in range(self.occupied_count[None]):
+                block = self.occupied[m]
+                if self.read_at[block] >= 0:
                     shortest = self.EMPTY
                     for stride in ti.static(self.grid.geometry.neighbour_strides):
                         if self.block_due[block + stride] > 0:
                             shortest = ti.min(shortest, self.step[block + stride])
                     if shortest != self.EMPTY:
                         self.wake(block, now + self.read_at[block], shortest)
-                self.read_cell(block)
+
+    @ti.kernel
+    def read_changed_cells(self):
+        """Take the new times of the cells that stepped or may have been woken."""
+        for m in range(self.occupied_count[None]):
+            if self.read_at[self.occupied[m]] >= 0:
+                self.read_cell(self.occupied[m])
 
     @ti.func
     def wake(self, block, now, shortest):
