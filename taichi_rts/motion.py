@@ -139,7 +139,8 @@ class Motion:
             present = now + read_at[self.grid.block(i)]
             dt = self.elapsed(i, present, tick)
             a = self.particles.a[i]
-            a_new = self.momentum.acceleration(k)
+            a_walls = self.momentum.wall_acceleration(k)
+            a_new = self.momentum.other_acceleration(k) + a_walls
             x = self.integrator.correct_position(self.near.x[k], a, a_new, dt)
             v = self.integrator.correct_velocity(self.particles.v[i], a, a_new, dt)
             v, a_new = self.limit(v, self.largest_speed), self.limit(a_new, self.largest_acceleration)
@@ -150,11 +151,15 @@ class Motion:
             if not finite:
                 self.not_finite[None] += 1
             inside = self.geometry.clamp(x)
+            v_free = v
             for d in ti.static(range(self.particles.dim)):
                 if inside[d] != x[d]:
                     self.stopped[None] += 1
                     if (x[d] - inside[d]) * v[d] > 0.0:
                         v[d] = 0.0
+            if ti.static(self.particles.has_budget):
+                self.particles.wall_push[i] += (0.5 * dt) * (self.particles.a_walls[i] + a_walls) + v - v_free
+                self.particles.a_walls[i] = a_walls
             if ti.static(self.particles.has_past):
                 self.particles.past_x[i] = self.particles.x[i]
                 self.particles.past_v[i] = self.particles.v[i]

@@ -25,8 +25,9 @@ class Particles:
     `rho_rate` d rho/dt [kg/(m^3 s)] exists only where a stepper extrapolates densities.
     `updated` is the tick of the last force evaluation, `level` the step in base steps (0 before the first evaluation),
     `identity` the stable particle id. The `past_` fields are the state at the evaluation before; they exist only where a
-    stepper lets some particles run ahead of others, so that readers may look back. Fields are re-sorted now and then so that
-    neighbours in space lie close in memory.
+    stepper lets some particles run ahead of others, so that readers may look back. In debug runs `wall_push` is the velocity
+    [m/s] that walls have given a particle so far, `a_walls` their share of its acceleration. Fields are re-sorted now and then
+    so that neighbours in space lie close in memory.
     """
 
     def __init__(
@@ -38,6 +39,7 @@ class Particles:
         *,
         with_rho_rate: bool = False,
         with_past: bool = False,
+        with_budget: bool = False,
     ) -> None:
         self.count, self.dim = positions.shape
         self.x = vector_field(self.dim, backend.dtype, self.count)
@@ -55,6 +57,10 @@ class Particles:
             self.past_v = vector_field(self.dim, backend.dtype, self.count)
             self.past_rho = ti.field(backend.dtype, self.count)
             self.past_updated = ti.field(ti.i32, self.count)
+        self.has_budget = with_budget
+        if with_budget:
+            self.a_walls = vector_field(self.dim, backend.dtype, self.count)
+            self.wall_push = vector_field(self.dim, backend.dtype, self.count)
         self.real_scratch = ti.field(backend.dtype, self.count)
         self.integer_scratch = ti.field(ti.i32, self.count)
         self.x.from_numpy(positions.astype(backend.numpy_dtype))
@@ -83,6 +89,7 @@ class Particles:
 
     def _real_fields(self) -> list[ti.Field]:
         vectors = [self.x, self.v, self.a] + ([self.past_x, self.past_v] if self.has_past else [])
+        vectors += [self.a_walls, self.wall_push] if self.has_budget else []
         scalars = (
             [self.rho] + ([self.past_rho] if self.has_past else []) + ([self.rho_rate] if self.has_rho_rate else [])
         )

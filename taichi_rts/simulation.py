@@ -10,7 +10,7 @@ import taichi as ti
 
 from taichi_rts import backend as backends
 from taichi_rts.diagnostics import Energy, Overhead, Tally, measure_energy
-from taichi_rts.errors import SimulationDivergedError, TimeError
+from taichi_rts.errors import Error, SimulationDivergedError, TimeError
 from taichi_rts.grid import BlockGrid, Geometry
 from taichi_rts.motion import Motion
 from taichi_rts.particles import Neighbourhood, Particles
@@ -32,7 +32,8 @@ class Simulation:
     """A scene, a stepper, and the state in between.
 
     Call `taichi_rts.init` first. Building one compiles its kernels and evaluates the first forces. With `debug` the stepper
-    checks at every step what is true by construction, and raises `AssertionError` where it is not.
+    checks at every step what is true by construction, and raises `AssertionError` where it is not; and the walls' impulse is
+    added up.
     """
 
     def __init__(self, scene: Scene, stepper: Stepper | None = None, *, debug: bool = False) -> None:
@@ -51,6 +52,7 @@ class Simulation:
             backend,
             with_rho_rate=self.stepper.extrapolates_density,
             with_past=self.stepper.keeps_past,
+            with_budget=debug,
         )
         drift = self.stepper.drift * scene.support
         geometry = Geometry(scene.domain.lower, scene.domain.upper, scene.support, drift)
@@ -77,6 +79,7 @@ class Simulation:
         self._tally = Tally(self.particles.count, self.schedule.levels)
         self._sorts = 0
         self._time = 0.0
+        self._initial_momentum = self.momentum()
         began = clock.perf_counter()
         self.step()  # lines 1-2: validity 0, so everybody is due at tick 0, where the first forces are evaluated
         self.schedule.take_counts()
@@ -207,3 +210,17 @@ class Simulation:
     def momentum(self) -> np.ndarray:
         """Total momentum [kg m/s], (dim,), at `time`."""
         return self.medium.mass * self.velocities().astype(np.float64).sum(axis=0)
+
+    def momentum_drift(self) -> np.ndarray:
+        """Momentum [kg m/s], (dim,), that no outer force accounts for: the change less gravity's and the walls' share.
+
+        Zero to rounding with uniform steps, where partners push each other equally at the same time. Needs a debug run and a
+        scene without body force, else raises `Error`.
+        """
+        if not self.particles.has_budget or self.scene.body_force is not None:
+            raise Error("the momentum budget needs Simulation(..., debug=True) and a scene without body_force")
+        p = self.particles
+        elapsed = self._time - p.updated.to_numpy() * self.timeline.tick
+        walls = p.wall_push.to_numpy().astype(float) + elapsed[:, None] * p.a_walls.to_numpy()
+        gravity = self.count * self._time * np.asarray(self.scene.acceleration)
+        return self.momentum() - self._initial_momentum - self.medium.mass * (walls.sum(axis=0) + gravity)

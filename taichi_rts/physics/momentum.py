@@ -59,6 +59,7 @@ class MomentumEquation:
         self.near = near
         self.walls = walls
         self.has_walls = walls is not None
+        self.dtype = backend.dtype
         self.gravity = tuple(gravity)
         self.has_body_force = body_force is not None
         if body_force is not None:
@@ -92,14 +93,20 @@ class MomentumEquation:
             self.sum_walls = make_neighbour_sum(grid.geometry, walls.start, wall_pair, dim, backend)
 
     @ti.func
-    def acceleration(self, k):
-        """Acceleration [m/s^2], (dim,), of the particle at place `k`."""
-        i = self.grid.order[k]
-        x, cell = self.near.x[k], self.grid.cell_of[i]
-        total = self.sum_fluid(k, x, cell)
+    def wall_acceleration(self, k):
+        """The walls' share of the acceleration [m/s^2], (dim,), of the particle at place `k`."""
+        total = ti.Vector.zero(self.dtype, self.grid.geometry.dim)
         if ti.static(self.has_walls):
+            i = self.grid.order[k]
             if self.walls.near[self.grid.block(i)] == 1:
-                total += self.sum_walls(k, x, cell)
+                total = self.sum_walls(k, self.near.x[k], self.grid.cell_of[i])
+        return total
+
+    @ti.func
+    def other_acceleration(self, k):
+        """All but the walls' share of the acceleration [m/s^2], (dim,), of the particle at place `k`."""
+        x = self.near.x[k]
+        total = self.sum_fluid(k, x, self.grid.cell_of[self.grid.order[k]])
         for d in ti.static(range(self.grid.geometry.dim)):
             total[d] += self.gravity[d]
         if ti.static(self.has_body_force):

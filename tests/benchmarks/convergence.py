@@ -29,7 +29,7 @@ DROPS = {"elliptical_drop": (0.1, 0.004, (-100.0,)), "oscillating_drop": (0.1, 0
 
 def regional(courant, **options):
     """Three levels, the longest step at `courant`, with all criteria scaled by it, so that the regions stay the same."""
-    return rts.Regional(courant=courant / 3, levels=3, alpha=courant / 2, lambda_f=courant / 8, **options)
+    return rts.Regional(courant=courant / 3, levels=3, alpha=courant / 2, lambda_f=courant / 32, **options)
 
 
 STEPPERS = {
