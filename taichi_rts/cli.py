@@ -15,7 +15,7 @@ from taichi_rts.errors import Error, OutputError
 from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
 from taichi_rts.rendering.painter import Mode, PictureOptions
 
-STEPPERS: dict[str, Any] = {kind.name: kind for kind in (rts.Uniform, rts.Regional)}
+STEPPERS: dict[str, Any] = {kind.name: kind for kind in (rts.Uniform, rts.Regional, rts.Asynchronous)}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,18 +32,18 @@ class Run:
     """Where kernels run; auto takes the first of cuda, vulkan, cpu that is there. A named one never falls back."""
     precision: Literal["f32", "f64"] = "f32"
     """Floating-point precision."""
-    stepper: Literal["uniform", "regional"] = "regional"
-    """One step for all, or a step for each block."""
+    stepper: Literal["uniform", "regional", "asynchronous"] = "regional"
+    """One step for all, a step for each block, or a time for each block."""
     preset: Literal["paper"] | None = None
     """Regional: the paper's setting (courant 0.4, 3 levels, Eq. 1 not enforced beyond level 1)."""
     courant: float | None = None
-    """Courant number dt c_s / r of the base step."""
+    """Courant number dt c_s / r of the base step; asynchronous: of the longest step."""
     levels: int | None = None
-    """Regional: largest number of base steps in a step."""
+    """Regional, asynchronous: largest number of base steps in a step."""
     alpha: float | None = None
     """Regional: alpha of Eq. 3."""
     lambda_f: float | None = None
-    """Regional, adaptive uniform: factor of the force limit, Eq. 2."""
+    """Regional, asynchronous, adaptive uniform: factor of the force limit, Eq. 2."""
     strict_cfl: bool | None = None
     """Regional: divide the base step by the number of levels, so that the longest step respects Eq. 1."""
     grading: bool | None = None
@@ -51,7 +51,13 @@ class Run:
     corrector: bool | None = None
     """Regional: Serna's corrector. Without it the method blows up."""
     inactive_density: Literal["stale", "extrapolated"] | None = None
-    """Regional: density of particles that are not due."""
+    """Regional, asynchronous: density of particles that are not due."""
+    steps: Literal["powers_of_two", "integers"] | None = None
+    """Asynchronous: lengths that steps may have, in base steps; powers_of_two keeps blocks in step with each other."""
+    limiter: bool = True
+    """Asynchronous: bound a block's step by its neighbours', and wake neighbours whose step is too long."""
+    stagger: int | None = None
+    """Asynchronous: seed of random first steps, so that all blocks have different ages."""
     integrator: Literal["serna", "symplectic_euler"] | None = None
     """Uniform: how to integrate."""
     adaptive: bool | None = None
@@ -84,8 +90,8 @@ class Run:
     """Camera angle around the vertical [degrees]."""
     elevation: float | None = None
     """Camera angle above the ground [degrees]."""
-    panels: Literal["figure3", "ablation"] | None = None
-    """Several panels in a frame: the paper's Figure 3 or 2, instead of --stepper."""
+    panels: Literal["figure3", "ablation", "steppers"] | None = None
+    """Several panels in a frame: the paper's Figure 3 or 2, or one for each stepper. They have their own steppers."""
     video: bool = False
     """Also write video.mp4 (needs the extra `video`)."""
     gui: bool = False
@@ -96,9 +102,8 @@ class Run:
         changes = {key: getattr(self, key) for key in ("spacing", "sound_speed", "end_time")}
         changes = {key: value for key, value in changes.items() if value is not None}
         scene = rts.load_scene(self.scene, particles=self.particles, **changes)
-        layout = self.panels or DEFAULT_LAYOUT.get(scene.name)
         stepper = self.make_stepper()
-        panels = LAYOUTS[layout] if layout else [Panel("", stepper)]
+        panels = self.make_panels(scene.name, stepper)
         options = PictureOptions(
             **{f.name: getattr(self, f.name) for f in dataclasses.fields(PictureOptions) if hasattr(self, f.name)}
         )
@@ -124,13 +129,35 @@ class Run:
     def make_stepper(self) -> Any:
         """Build the stepper from the options that were given; raises `StepperError` if one does not belong to it."""
         kind = STEPPERS[self.stepper]
-        own = set(kind.__dataclass_fields__)
-        possible = {key for other in STEPPERS.values() for key in other.__dataclass_fields__} & set(vars(self))
-        given = {key: getattr(self, key) for key in sorted(possible) if getattr(self, key) is not None}
-        if foreign := sorted(set(given) - own):
-            names = ", ".join(f"--{key.replace('_', '-')}" for key in foreign)
-            raise rts.StepperError(f"{names} does not belong to the {self.stepper} stepper; leave it out")
+        given = self.stepper_options()
+        if foreign := sorted(set(given) - set(kind.__dataclass_fields__)):
+            raise rts.StepperError(f"{flags(foreign)} does not belong to the {self.stepper} stepper; leave it out")
         return kind(**given)
+
+    def make_panels(self, scene: str, stepper: Any) -> list[Panel]:
+        """Return the panels of a layout, or one with `stepper`; raises `StepperError` if both were asked for."""
+        given = [*(["stepper"] if self.stepper != Run.stepper else []), *self.stepper_options()]
+        if self.panels and given:
+            raise rts.StepperError(f"--panels {self.panels} has steppers of its own; leave out {flags(given)}")
+        layout = self.panels or (None if given else DEFAULT_LAYOUT.get(scene))
+        return LAYOUTS[layout] if layout else [Panel("", stepper)]
+
+    def stepper_options(self) -> dict[str, Any]:
+        """Return the steppers' parameters that were given, in alphabetical order."""
+        return {key: getattr(self, key) for key in STEPPER_OPTIONS if getattr(self, key) != getattr(Run, key)}
+
+    def without_stepper(self) -> Run:
+        """Return the same run without a choice of stepper and its parameters."""
+        return dataclasses.replace(self, **{key: getattr(Run, key) for key in ("stepper", *STEPPER_OPTIONS)})
+
+
+STEPPER_OPTIONS = sorted({key for kind in STEPPERS.values() for key in kind.__dataclass_fields__} & set(vars(Run)))
+"""Options of `Run` that are some stepper's parameters."""
+
+
+def flags(keys: list[str]) -> str:
+    """Return options of `Run` as a user has to write them to change their default."""
+    return ", ".join(f"--{'no-' if getattr(Run, key) is True else ''}{key.replace('_', '-')}" for key in keys)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -171,8 +198,15 @@ def main(args: list[str] | None = None) -> None:
 
 def run_demo(scene: str, **defaults: Any) -> None:
     """Run a demo: `taichi-rts run SCENE` with other defaults; takes the same options."""
-    default = Run(scene=scene, **{"output_dir": Path("out") / scene} | defaults)
-    _execute(tyro.cli(Run, default=default))
+    _execute(parse_demo(Run(scene=scene, **{"output_dir": Path("out") / scene} | defaults)))
+
+
+def parse_demo(default: Run, args: list[str] | None = None) -> Run:
+    """Parse a demo's command line: what the demo sets for its stepper holds for no other and for no panels."""
+    run = tyro.cli(Run, default=default, args=args)
+    if run.stepper != default.stepper or run.panels != default.panels:
+        run = tyro.cli(Run, default=default.without_stepper(), args=args)
+    return run
 
 
 def _execute(command: Any) -> None:

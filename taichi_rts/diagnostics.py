@@ -141,9 +141,10 @@ class Overhead:
         return shared / (shared + self.due.seconds / self.updates * self.count)
 
 
-def speedup_bound(active_fraction: float, overhead_fraction: float) -> float:
-    """Upper bound for the speed-up over uniform steps of the base step: 1 / (e + (1-e) a).
+def speedup_bound(active_fraction: float, overhead_fraction: float, passes: float = 1.0) -> float:
+    """Upper bound for the speed-up over uniform steps of the base step: 1 / (e p + (1-e) a).
 
-    `active_fraction` a holds sum_n f_n/n and the recomputation by pre-emption; `overhead_fraction` e is paid by all.
+    `active_fraction` a holds sum_n f_n/n and the recomputation by pre-emption; `overhead_fraction` e is paid by all in each
+    of the p `passes` of a base step.
     """
-    return 1.0 / (overhead_fraction + (1.0 - overhead_fraction) * active_fraction)
+    return 1.0 / (overhead_fraction * passes + (1.0 - overhead_fraction) * active_fraction)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from taichi_rts.stepping.asynchronous import Asynchronous
 from taichi_rts.stepping.regional import Regional
 from taichi_rts.stepping.uniform import Uniform
 
@@ -30,8 +31,16 @@ LAYOUTS: dict[str, list[Panel]] = {
         Panel("Without the corrector", Regional(preset="paper", corrector=False)),
         Panel("With the corrector", PAPER),
     ],
+    "steppers": [
+        Panel("Uniform: every step is 0.4 r/c_s", Uniform()),
+        Panel("Regional, the paper's preset: steps of 1 to 3 times 0.4 r/c_s", PAPER),
+        Panel(
+            "Asynchronous, courant 0.8, lambda_f 0.05: steps of 1 to 16 times 0.05 r/c_s",
+            Asynchronous(courant=0.8, levels=16, lambda_f=0.05),
+        ),
+    ],
 }
-"""`figure3` and `ablation` are Figures 3 and 2 of Goswami & Batty 2014."""
+"""`figure3` and `ablation` are Figures 3 and 2 of Goswami & Batty 2014; `steppers` shows what each stepper makes of a scene."""
 
 DEFAULT_LAYOUT = {"serna_ablation": "ablation"}
 """Scenes that are about a comparison, and the layout that shows it."""

@@ -15,6 +15,7 @@ from rich.table import Table
 
 from taichi_rts.backend import Backend
 from taichi_rts.diagnostics import Energy, speedup_bound
+from taichi_rts.rendering.painter import level_classes, milliseconds
 from taichi_rts.scene import Scene
 from taichi_rts.simulation import Simulation
 
@@ -56,27 +57,55 @@ def print_table(sim: Simulation, initial_energy: Energy) -> None:
     levels = Table(title=f"{sim.scene.name}, {sim.stepper.name} steps", title_justify="left")
     for heading in ("level", "step [ms]", "share of particles", "share of updates"):
         levels.add_column(heading, justify="right")
-    shares = zip(statistics["level_fractions"], statistics["update_fractions"], strict=True)
-    for n, (particles, updates) in enumerate(shares, start=1):
-        levels.add_row(str(n), f"{1e3 * n * sim.base_step:.3f}", f"{particles:.2%}", f"{updates:.2%}")
+    for row in level_rows(sim, statistics):
+        levels.add_row(*row)
     console.print(levels)
 
     energy = sim.energy()
     drift = (energy.total - initial_energy.total) / abs(initial_energy.total) if initial_energy.total else 0.0
     facts = Table(show_header=False, box=None)
-    facts.add_row("active fraction", f"{statistics['active_fraction']:.3f}")
-    facts.add_row("base steps", f"{statistics['base_steps']:,} in {statistics['wall_seconds']:.2f} s")
+    active, base_steps = statistics["active_fraction"], statistics["base_steps"]
+    facts.add_row("active fraction", f"{active:.3f}")
+    facts.add_row("updates saved", f"{1.0 - active:.1%} over uniform steps of the base step")
+    facts.add_row("base steps", f"{base_steps:,} in {statistics['wall_seconds']:.2f} s")
     facts.add_row("updates", rate(statistics["particle_updates"], statistics["wall_seconds"]))
     overhead = statistics["overhead_fraction"]
     if overhead is not None:
-        bound = speedup_bound(statistics["active_fraction"], overhead)
+        passes = statistics.get("passes", base_steps) / max(1, base_steps)
+        bound = speedup_bound(active, overhead, passes)
         facts.add_row("paid by all (ε)", f"{overhead:.1%} of a full step")
         facts.add_row("speed-up bound", f"{bound:.2f} over uniform steps of the base step")
+    for name, fact in pass_facts(statistics):
+        facts.add_row(name, fact)
     facts.add_row("energy drift", f"{drift:+.2%} of {initial_energy.total:.4g} J")
     facts.add_row("stopped by the box", f"{statistics['stopped_by_domain']} centres")
     if statistics["runaways"]:
         facts.add_row("[bold red]blown up[/]", f"limited {statistics['runaways']:,} times; use a smaller --courant")
     console.print(facts)
+
+
+def level_rows(sim: Simulation, statistics: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
+    """Return level, step [ms], share of particles and of updates as text; where levels double, a row for each octave in use."""
+    particles, updates = statistics["level_fractions"], statistics["update_fractions"]
+    rows = []
+    for each in level_classes(particles, sim.schedule.levels_double):
+        if each.share > 0.0 or not sim.schedule.levels_double:
+            steps = [milliseconds(n * sim.base_step) for n in sorted({each.first, each.last})]
+            share = sum(updates[each.first - 1 : each.last])
+            rows.append((str(each), "–".join(steps), f"{each.share:.2%}", f"{share:.2%}"))
+    return rows
+
+
+def pass_facts(statistics: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return what a stepper that works in passes has to say about them."""
+    if "passes" not in statistics:
+        return []
+    cells = statistics["cells_per_pass"]
+    return [
+        ("passes", f"{statistics['passes']:,} in {statistics['cycles']:,} cycles"),
+        ("cells in a pass", f"{cells['min']:,} to {cells['max']:,}, median {cells['median']:,.0f}"),
+        ("woken", f"{statistics['wakes']:,} particles"),
+    ]
 
 
 def print_folder(folder: Path, frames: int) -> None:

@@ -186,6 +186,20 @@ class Simulation:
         """Levels n, (N,): each particle's step is n base steps. In order of particle id."""
         return self.state()[3]
 
+    def steps(self) -> np.ndarray:
+        """Steps [s], (N,): level times base step (`Uniform(adaptive=True)`: at most). In order of particle id."""
+        return self._by_identity(self.particles.level.to_numpy()) * self.base_step
+
+    def leads(self) -> np.ndarray:
+        """How far [s] the end of each particle's step lies ahead of the earliest end, (N,). In order of particle id."""
+        ends = self.particles.updated.to_numpy() + self.particles.level.to_numpy() * self.schedule.base_ticks
+        return self._by_identity(ends - ends.min()) * self.timeline.tick
+
+    def _by_identity(self, values: np.ndarray) -> np.ndarray:
+        ordered = np.empty_like(values)
+        ordered[self.particles.identity.to_numpy()] = values
+        return ordered
+
     @property
     def statistics(self) -> dict[str, Any]:
         """Work so far: base_steps, particle_updates, wall_seconds, active_fraction, level_fractions and more.

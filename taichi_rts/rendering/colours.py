@@ -35,10 +35,19 @@ def _choose(kind: str, name: str, choices: dict):
     return choices[name]
 
 
-def level_colours(levels, palette: str = "default") -> np.ndarray:
-    """Return (N, 3) colours of levels, counted from 1; levels beyond the palette take its last colour."""
+def octaves(levels) -> np.ndarray:
+    """Return 1 + floor(log2 n) of levels n: 1 is in octave 1, 2 and 3 are in octave 2, 4 to 7 in octave 3."""
+    return np.frexp(np.asarray(levels, float))[1]  # exact, unlike a logarithm
+
+
+def level_colours(levels, palette: str = "default", *, doubling: bool = False) -> np.ndarray:
+    """Return (N, 3) colours of levels, counted from 1; levels beyond the palette take its last colour.
+
+    With `doubling` an octave of levels shares a colour: the palette then reaches to level 65535.
+    """
     table = _choose("palette", palette, PALETTES)
-    return table[np.clip(np.asarray(levels, np.int64) - 1, 0, len(table) - 1)]
+    places = octaves(levels) if doubling else np.asarray(levels, np.int64)
+    return table[np.clip(places - 1, 0, len(table) - 1)]
 
 
 def scalar_colours(values, lower: float, upper: float, colormap: str = "lagoon") -> np.ndarray:
@@ -63,8 +72,8 @@ def _needed(mode: str, name: str, values):
     return np.asarray(values)
 
 
-def _by_level(levels, palette, **_):
-    return level_colours(_needed("level", "levels", levels), palette)
+def _by_level(levels, palette, doubling, **_):
+    return level_colours(_needed("level", "levels", levels), palette, doubling=doubling)
 
 
 def _by_speed(speeds, max_speed, **_):
@@ -76,20 +85,47 @@ def _by_density(densities, rest_density, **_):
     return scalar_colours(_needed("density", "densities", densities), *density_range(rest_density), "balance")
 
 
+def _by_step(steps, longest_step, **_):
+    steps = _needed("step", "steps", steps)
+    return scalar_colours(steps, *step_range(steps, longest_step))
+
+
+def _by_lead(leads, longest_step, **_):
+    leads = _needed("lead", "leads", leads)
+    return scalar_colours(leads, *step_range(leads, longest_step))
+
+
 def _plain(count, **_):
     return np.tile(np.asarray(PLAIN, np.float32), (count, 1))
 
 
-_MODES = {"level": _by_level, "speed": _by_speed, "density": _by_density, "plain": _plain}
+_MODES = {
+    "level": _by_level,
+    "step": _by_step,
+    "lead": _by_lead,
+    "speed": _by_speed,
+    "density": _by_density,
+    "plain": _plain,
+}
 MODES = tuple(_MODES)
 
 
 def speed_range(speeds, max_speed: float | None) -> tuple[float, float]:
     """Return the range that mode "speed" shows [m/s]."""
-    if max_speed is None:
-        finite = np.asarray(speeds)[np.isfinite(speeds)]
-        max_speed = float(finite.max()) if finite.size else 1.0
-    return 0.0, max(float(max_speed), 1e-12)
+    return 0.0, _upper(speeds, max_speed)
+
+
+def step_range(steps, longest_step: float | None) -> tuple[float, float]:
+    """Return the range that modes "step" and "lead" show [s]."""
+    return 0.0, _upper(steps, longest_step)
+
+
+def _upper(values, given: float | None) -> float:
+    """Upper end of a range from 0: as given, else the largest value."""
+    if given is None:
+        finite = np.asarray(values)[np.isfinite(values)]
+        given = float(finite.max()) if finite.size else 1.0
+    return max(float(given), 1e-12)
 
 
 def density_range(rest_density: float) -> tuple[float, float]:
@@ -103,24 +139,32 @@ def colour_by(
     levels=None,
     speeds=None,
     densities=None,
+    steps=None,
+    leads=None,
     rest_density: float = 1000.0,
     max_speed: float | None = None,
+    longest_step: float | None = None,
     palette: str = "default",
+    doubling: bool = False,
 ) -> np.ndarray:
-    """Return (N, 3) float32 colours; `mode` is "level", "speed", "density" or "plain"."""
+    """Return (N, 3) float32 colours; `mode` is one of `MODES`, speeds are in m/s, densities in kg/m^3, the others in s."""
     choose = _choose("colour mode", mode, _MODES)
-    given = [values for values in (levels, speeds, densities) if values is not None]
+    given = [values for values in (levels, speeds, densities, steps, leads) if values is not None]
     if not given:
         raise RenderError(
             f"colour mode {mode!r} got no array, and needs at least one to know the number of particles: "
-            "pass levels=, speeds= or densities="
+            "pass levels=, speeds=, densities=, steps= or leads="
         )
     return choose(
         levels=levels,
         speeds=speeds,
         densities=densities,
+        steps=steps,
+        leads=leads,
         rest_density=rest_density,
         max_speed=max_speed,
+        longest_step=longest_step,
         palette=palette,
+        doubling=doubling,
         count=len(given[0]),
     )

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 from taichi_rts.rendering.ggui import LiveWindow
-from taichi_rts.rendering.painter import Painter, PictureOptions, make_camera
+from taichi_rts.rendering.painter import Painter, PictureOptions, make_camera, milliseconds
 from taichi_rts.scene import Scene
 from taichi_rts.simulation import Simulation
 
-STEPS_PER_FRAME = 4  # base steps between two pictures
+STEPS_PER_FRAME = 4  # base steps between two pictures, or as many as the longest step has
 
 
 def watch(scene: Scene, stepper: Any, options: PictureOptions, start: Callable[[], object]) -> Simulation:
@@ -23,7 +23,7 @@ def watch(scene: Scene, stepper: Any, options: PictureOptions, start: Callable[[
     sim = Simulation(scene, stepper)
     painter = Painter(scene, options, renderer=window)
     camera, outline = make_camera(scene, options), (scene.domain.lower, scene.domain.upper)
-    frame = STEPS_PER_FRAME * sim.base_step
+    frame = max(STEPS_PER_FRAME, sim.schedule.levels) * sim.base_step
     while window.running:
         if not window.paused and sim.time < scene.end_time:
             sim.advance_to(min(sim.time + frame, scene.end_time))
@@ -31,10 +31,10 @@ def watch(scene: Scene, stepper: Any, options: PictureOptions, start: Callable[[
         statistics = sim.statistics
         lines = [
             f"t = {sim.time:.3f} of {scene.end_time:g} s" + (" (paused)" if window.paused else ""),
-            f"base step {1e3 * sim.base_step:.3f} ms",
+            f"{sim.stepper.name} steps, base step {milliseconds(sim.base_step)} ms",
             f"active {statistics['active_fraction']:.1%}",
             f"{sim.count:,} particles",
         ]
-        window.draw(x, painter.colours(v, rho, level), 0.5 * scene.spacing, camera, outline, lines)
+        window.draw(x, painter.colours(sim, v, rho, level), 0.5 * scene.spacing, camera, outline, lines)
     window.close()
     return sim

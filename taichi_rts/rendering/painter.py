@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -13,8 +14,9 @@ from taichi_rts.rendering.splatter import Splatter
 from taichi_rts.scene import Scene
 from taichi_rts.simulation import Simulation
 
-Mode = Literal["level", "speed", "density", "plain"]
+Mode = Literal["level", "step", "lead", "speed", "density", "plain"]
 BAR_STEPS = 64
+LEGEND_ROWS = 8  # with more levels than that the legend leaves out those that nobody has
 
 
 @dataclass(frozen=True)
@@ -69,47 +71,113 @@ class Painter:
     def paint(self, sim: Simulation) -> np.ndarray:
         """Return the picture of `sim` at its present time, (height, width, 3) uint8."""
         x, v, rho, level = sim.state()
-        tints = self.colours(v, rho, level)
+        tints = self.colours(sim, v, rho, level)
         outline = (self.scene.domain.lower, self.scene.domain.upper)
         image = self.renderer.draw(x, tints, 0.5 * self.scene.spacing, self.camera, outline)
         return self._label(image, sim, level) if self.options.legend else image
 
-    def colours(self, v: np.ndarray, rho: np.ndarray, level: np.ndarray) -> np.ndarray:
-        """Colours (N, 3) of particles with velocities `v`, densities `rho` and levels."""
+    def colours(self, sim: Simulation, v: np.ndarray, rho: np.ndarray, level: np.ndarray) -> np.ndarray:
+        """Colours (N, 3) of the particles of `sim`, whose velocities `v`, densities `rho` and levels these are."""
+        mode = self.options.colour_by
         return colours.colour_by(
-            self.options.colour_by,
+            mode,
             levels=level,
             speeds=np.linalg.norm(v, axis=1),
             densities=rho,
+            steps=sim.steps() if mode == "step" else None,
+            leads=sim.leads() if mode == "lead" else None,
             rest_density=self.scene.rest_density,
             max_speed=self.top_speed,
+            longest_step=longest_step(sim),
             palette=self.options.palette,
+            doubling=sim.schedule.levels_double,
         )
 
     def _label(self, image: np.ndarray, sim: Simulation, level: np.ndarray) -> np.ndarray:
-        lines = [f"t = {sim.time:.3f} s", f"Δt_b = {1e3 * sim.base_step:.3f} ms", f"{sim.count:,} particles"]
+        lines = [f"t = {sim.time:.3f} s", f"Δt_b = {milliseconds(sim.base_step)} ms", f"{sim.count:,} particles"]
         entries = self._entries(sim, level) if self.options.colour_by == "level" else []
         image = legend.draw_legend(image, self.title, entries, lines)
         bar = _BARS.get(self.options.colour_by)
-        return bar(self, image) if bar else image
+        return bar(self, image, sim) if bar else image
 
     def _entries(self, sim: Simulation, level: np.ndarray) -> list[tuple[str, Any, float]]:
-        """One entry a level, with the share of particles that have it now."""
+        """One entry a colour of levels, with the share of particles that have it now."""
         shares = np.bincount(level, minlength=sim.schedule.levels + 1)[1:] / max(1, len(level))
-        tints = colours.level_colours(np.arange(1, len(shares) + 1), self.options.palette)
-        names = [f"level {n}: {n} Δt_b" if n > 1 else "level 1: Δt_b" for n in range(1, len(shares) + 1)]
-        return [(name, tuple(tint), float(share)) for name, tint, share in zip(names, tints, shares, strict=True)]
+        classes = level_classes(shares, sim.schedule.levels_double)
+        if sim.schedule.levels_double and len(classes) > LEGEND_ROWS:
+            classes = [each for each in classes if each.share > 0.0]
+        tints = colours.level_colours(
+            [each.first for each in classes], self.options.palette, doubling=sim.schedule.levels_double
+        )
+        return [
+            (f"level {each}: {each} Δt_b" if each.last > 1 else "level 1: Δt_b", tuple(tint), each.share)
+            for each, tint in zip(classes, tints, strict=True)
+        ]
 
-    def _speed_bar(self, image: np.ndarray) -> np.ndarray:
+    def _step_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
+        return self._milliseconds_bar(image, sim, "step")
+
+    def _lead_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
+        return self._milliseconds_bar(image, sim, "ahead of the youngest")
+
+    def _milliseconds_bar(self, image: np.ndarray, sim: Simulation, title: str) -> np.ndarray:
+        lower, upper = colours.step_range([], longest_step(sim))
+        values = np.linspace(lower, upper, BAR_STEPS)
+        tints = colours.colour_by("step", steps=values, longest_step=upper)
+        return legend.draw_colour_bar(image, title, 1e3 * lower, 1e3 * upper, "ms", tints)
+
+    def _speed_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
         values = np.linspace(0.0, self.top_speed, BAR_STEPS)
         tints = colours.colour_by("speed", speeds=values, max_speed=self.top_speed)
         return legend.draw_colour_bar(image, "speed", 0.0, self.top_speed, "m/s", tints)
 
-    def _density_bar(self, image: np.ndarray) -> np.ndarray:
+    def _density_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
         lower, upper = colours.density_range(self.scene.rest_density)
         values = np.linspace(lower, upper, BAR_STEPS)
         tints = colours.colour_by("density", densities=values, rest_density=self.scene.rest_density)
         return legend.draw_colour_bar(image, "density", lower, upper, "kg/m^3", tints)
 
 
-_BARS = {"speed": Painter._speed_bar, "density": Painter._density_bar}
+_BARS = {
+    "step": Painter._step_bar,
+    "lead": Painter._lead_bar,
+    "speed": Painter._speed_bar,
+    "density": Painter._density_bar,
+}
+
+
+def longest_step(sim: Simulation) -> float:
+    """The longest step [s] that the stepper can take."""
+    return sim.schedule.levels * sim.base_step
+
+
+def milliseconds(time: float) -> str:
+    """Return a time [s] as text in ms: with three decimals, or three digits where that would be too coarse."""
+    value = 1e3 * time
+    return f"{value:.3f}" if value >= 0.1 else f"{value:.3g}"
+
+
+class LevelClass(NamedTuple):
+    """Levels that readers see as one: those from `first` to `last`, and how much of the whole they have."""
+
+    first: int
+    last: int
+    share: float
+
+    def __str__(self) -> str:
+        """Return "4", or "4–7"."""
+        return str(self.first) if self.first == self.last else f"{self.first}–{self.last}"
+
+
+def level_classes(shares: Sequence[float] | np.ndarray, doubling: bool) -> list[LevelClass]:
+    """Return a class for each level, or with `doubling` for each octave, which then names only levels that have a share."""
+    share = np.asarray(shares, float)
+    if not doubling:
+        return [LevelClass(n, n, float(part)) for n, part in enumerate(share, start=1)]
+    levels = np.arange(1, len(share) + 1)
+    classes = []
+    for octave in np.unique(colours.octaves(levels)):
+        members = levels[colours.octaves(levels) == octave]
+        some = members[share[members - 1] > 0.0] if share[members - 1].any() else members[:1]
+        classes.append(LevelClass(int(some[0]), int(some[-1]), float(share[members - 1].sum())))
+    return classes

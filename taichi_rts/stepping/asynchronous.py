@@ -125,6 +125,7 @@ class AsynchronousSchedule(Schedule):
     """
 
     EMPTY = BlockLimiter.EMPTY
+    levels_double = True
 
     def __init__(
         self, stepper: Asynchronous, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline

@@ -52,12 +52,14 @@ class Schedule:
             where none does.
         base_ticks: ticks in one base step.
         levels: number of levels; level n steps every n base steps.
+        levels_double: whether steps come in octaves rather than one by one, which is how pictures and tables group them.
         needs_sorting: whether the grid has to be sorted before the present step.
         steps: base steps begun so far.
         debug: check at run time what is true by construction.
     """
 
     levels = 1
+    levels_double = False
     base_ticks = 1
     needs_sorting = True
 

@@ -6,7 +6,9 @@ import sys
 import imageio.v3 as imageio
 import pytest
 
+import taichi_rts as rts
 from taichi_rts import cli
+from taichi_rts.panels import LAYOUTS, Panel
 
 SMALL = [
     "--arch",
@@ -86,6 +88,13 @@ def test_existing_output_is_kept(two_runs):
         (["run", "dam_break", "--particles", "many"], ["many", "30k"]),
         (["run", "dam_break", "--levels", "0"], ["levels", "0"]),
         (["run", "dam_break", "--stepper", "uniform", "--levels", "3"], ["--levels", "uniform"]),
+        (["run", "dam_break", "--stepper", "uniform", "--stagger", "1"], ["--stagger", "uniform"]),
+        (["run", "dam_break", "--no-limiter"], ["--no-limiter", "regional"]),
+        (["run", "dam_break", "--stepper", "asynchronous", "--preset", "paper"], ["--preset", "asynchronous"]),
+        (["run", "dam_break", "--stepper", "asynchronous", "--levels", "6"], ["levels 6", "use 4 or 8"]),
+        (["run", "dam_break", "--panels", "figure3", "--levels", "3"], ["--panels figure3", "--levels"]),
+        (["run", "dam_break", "--panels", "steppers", "--stepper", "uniform"], ["--panels steppers", "--stepper"]),
+        (["run", "dam_break", "--colour-by", "age"], ["age", "lead"]),
         (["run", "dam_break", "--arch", "tpu"], ["tpu"]),
         (["run", "dam_break", "--width", "1"], ["1 x 720"]),
         (["run", "dam_break", "--export-fps", "0"], ["export_fps"]),
@@ -101,6 +110,62 @@ def test_bad_input_is_one_message_and_exit_code_2(args, words, tmp_path, capsys)
         assert word in captured.err + captured.out
     assert "Traceback" not in captured.err
     assert not (tmp_path / "out").exists()
+
+
+def parse(*args):
+    return cli.parse_demo(cli.Run(scene="double_dam_break", preset="paper", export_fps=20.0), list(args))
+
+
+def test_a_demos_preset_holds_for_its_own_stepper_only():
+    assert parse().make_stepper() == rts.Regional(preset="paper")
+    assert parse("--levels", "4").make_stepper() == rts.Regional(preset="paper", levels=4)
+    other = parse("--stepper", "asynchronous", "--levels", "16", "--courant", "0.8")
+    assert other.make_stepper() == rts.Asynchronous(levels=16, courant=0.8)
+    assert other.export_fps == 20.0
+    assert parse("--stepper", "uniform").make_stepper() == rts.Uniform()
+    with pytest.raises(rts.StepperError, match="--preset does not belong to the asynchronous stepper"):
+        parse("--stepper", "asynchronous", "--preset", "paper").make_stepper()
+
+
+def test_every_option_of_the_asynchronous_stepper_can_be_given():
+    args = ["--steps", "integers", "--no-limiter", "--stagger", "7", "--levels", "6", "--lambda-f", "0.1"]
+    args += ["--courant", "0.8", "--inactive-density", "stale"]
+    wanted = rts.Asynchronous(0.8, 6, "integers", 0.1, limiter=False, inactive_density="stale", stagger=7)
+    assert parse("--stepper", "asynchronous", *args).make_stepper() == wanted
+    assert parse("--stepper", "asynchronous", "--limiter").make_stepper() == rts.Asynchronous()
+    assert set(rts.Asynchronous.__dataclass_fields__) - {"name"} <= set(cli.STEPPER_OPTIONS)
+
+
+def test_panels_have_their_own_steppers():
+    def panels(scene, *args):
+        run = parse(*args)
+        return run.make_panels(scene, run.make_stepper())
+
+    assert panels("dam_break", "--panels", "steppers") == LAYOUTS["steppers"]
+    assert [panel.stepper.name for panel in LAYOUTS["steppers"]] == ["uniform", "regional", "asynchronous"]
+    assert panels("serna_ablation", "--stepper", "uniform") == [Panel("", rts.Uniform())]
+    assert cli.Run().make_panels("serna_ablation", rts.Regional()) == LAYOUTS["ablation"]
+    with pytest.raises(rts.StepperError, match="leave out --preset"):
+        panels("dam_break", "--panels", "steppers", "--preset", "paper")
+
+
+def test_a_panel_for_each_stepper_at_the_same_time(tmp_path):
+    size = ["--spacing", "0.05", "--end-time", "0.02", "--export-fps", "50", "--width", "320", "--height", "360"]
+    result = run(
+        "run", "dam_break_2d", "--panels", "steppers", "--arch", "cpu", *size, "--output-dir", str(tmp_path / "out")
+    )
+    assert result.returncode == 0, result.stderr
+    facts = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert [each["stepper"]["name"] for each in facts["panels"]] == ["uniform", "regional", "asynchronous"]
+    assert {each["end_time"] for each in facts["panels"]} == {0.02}
+    last = facts["panels"][2]
+    assert last["base_steps"] == pytest.approx(0.02 / last["base_step"], abs=1)
+    assert last["passes"] > 0
+    assert last["cells_per_pass"]["max"] >= last["cells_per_pass"]["min"] >= 1
+    height, width, _ = imageio.imread(tmp_path / "out" / "frames" / "000001.png").shape
+    assert width == 320
+    assert height > 3 * 180
+    assert "cells in a pass" in result.stdout
 
 
 def test_a_missing_arch_never_falls_back(tmp_path):

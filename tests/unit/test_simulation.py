@@ -23,6 +23,37 @@ def test_readers_before_the_first_step(taichi_cpu_f64):
     assert (sim.pressures() == sim.medium.equation_of_state.pressure_numpy(sim.densities())).all()
 
 
+def test_steps_and_leads_are_in_order_of_identity(taichi_cpu_f64):
+    sim = rts.Simulation(SMALL, rts.Asynchronous(levels=8))
+    identity = np.arange(50)[::-1].astype(np.int32)
+    sim.particles.identity.from_numpy(identity)
+    sim.particles.updated.from_numpy(np.arange(50, dtype=np.int32))
+    sim.particles.level.from_numpy((1 + np.arange(50) % 8).astype(np.int32))
+    tick = sim.timeline.tick
+    assert sim.steps()[identity] == pytest.approx((1 + np.arange(50) % 8) * tick)
+    assert sim.leads()[identity] == pytest.approx((np.arange(50) + np.arange(50) % 8) * tick)
+
+
+@pytest.mark.parametrize(
+    "stepper",
+    [rts.Uniform(), rts.Uniform(adaptive=True), rts.Regional(levels=3), rts.Asynchronous(stagger=1, steps="integers")],
+    ids=["uniform", "adaptive", "regional", "asynchronous"],
+)
+def test_steps_are_levels_of_base_steps_and_leads_count_from_the_youngest(taichi_cpu_f64, stepper):
+    sim = rts.Simulation(SMALL, stepper)
+    sim.advance_to(5.5 * sim.base_step)
+    assert sim.steps() == pytest.approx(sim.levels() * sim.base_step)
+    assert sim.steps().max() <= sim.schedule.levels * sim.base_step * (1 + 1e-12)
+    leads = sim.leads()
+    assert leads.shape == (50,)
+    assert leads.min() == 0.0
+    if isinstance(stepper, rts.Uniform):
+        assert leads.max() == 0.0
+    if isinstance(stepper, rts.Asynchronous):
+        assert leads.max() >= sim.timeline.tick
+        assert leads / sim.timeline.tick == pytest.approx(np.rint(leads / sim.timeline.tick))
+
+
 @pytest.mark.parametrize("field", ["x", "v", "a"])
 def test_what_is_not_a_number_ends_the_run(taichi_cpu_f64, field):
     sim = rts.Simulation(SMALL)

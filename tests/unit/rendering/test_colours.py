@@ -2,7 +2,16 @@ import numpy as np
 import pytest
 
 from taichi_rts.errors import RenderError
-from taichi_rts.rendering.colours import COLORMAPS, PALETTES, PLAIN, colour_by, level_colours, scalar_colours
+from taichi_rts.rendering.colours import (
+    COLORMAPS,
+    PALETTES,
+    PLAIN,
+    colour_by,
+    level_colours,
+    octaves,
+    scalar_colours,
+    step_range,
+)
 
 
 def cielab(colours):
@@ -34,6 +43,15 @@ def test_first_levels_and_the_ends_of_the_palette():
     assert level_colours([1]).dtype == np.float32
 
 
+def test_octaves_share_a_colour_where_levels_double():
+    assert octaves([1, 2, 3, 4, 7, 8, 1023, 1024]).tolist() == [1, 2, 2, 3, 3, 4, 10, 11]
+    doubling = level_colours([1, 2, 3, 4, 8, 1024], doubling=True)
+    assert np.array_equal(doubling, level_colours([1, 2, 2, 3, 4, 11]))
+    lab = cielab(level_colours(2 ** np.arange(11), doubling=True))
+    assert (np.linalg.norm(lab[:, None] - lab[None], axis=-1) + 1e9 * np.eye(11)).min() > 14
+    assert np.array_equal(colour_by("level", levels=[3, 4], doubling=True), level_colours([2, 3]))
+
+
 def test_lightness_of_the_speed_map_rises_steadily():
     lightness = cielab(scalar_colours(np.linspace(0, 1, 200), 0, 1))[:, 0]
     assert np.all(np.diff(lightness) > -0.05)
@@ -52,6 +70,11 @@ def test_modes():
     assert np.array_equal(colour_by("level", levels=levels), level_colours(levels))
     assert np.array_equal(colour_by("speed", speeds=speeds), scalar_colours(speeds, 0, 2))
     assert np.array_equal(colour_by("speed", speeds=speeds, max_speed=4), scalar_colours(speeds, 0, 4))
+    steps = np.array([0.001, 0.002, 0.004])
+    assert np.array_equal(colour_by("step", steps=steps, longest_step=0.008), scalar_colours(steps, 0, 0.008))
+    assert np.array_equal(colour_by("lead", leads=steps, steps=2 * steps), scalar_colours(steps, 0, 0.004))
+    assert step_range(steps, 0.008) == (0, 0.008)
+    assert step_range(steps, None) == (0, 0.004)
     rest = colour_by("density", densities=np.array([1000.0]), rest_density=1000.0)
     assert np.allclose(rest, 0xF2 / 255, atol=5e-3)
     plain = colour_by("plain", levels=levels)
@@ -60,11 +83,13 @@ def test_modes():
 
 
 def test_unknown_names_list_the_choices():
-    with pytest.raises(RenderError, match=r"'vorticity'.*level, speed, density, plain"):
+    with pytest.raises(RenderError, match=r"'vorticity'.*level, step, lead, speed, density, plain"):
         colour_by("vorticity", levels=[1])
     with pytest.raises(RenderError, match="default, paper"):
         level_colours([1], "nature")
     with pytest.raises(RenderError, match="needs speeds"):
         colour_by("speed", levels=[1])
+    with pytest.raises(RenderError, match="needs leads"):
+        colour_by("lead", steps=[1.0])
     with pytest.raises(RenderError, match="at least one"):
         colour_by("plain")

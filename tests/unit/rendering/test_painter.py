@@ -1,0 +1,84 @@
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import taichi_rts as rts
+from taichi_rts.rendering import legend
+from taichi_rts.rendering.colours import level_colours, scalar_colours
+from taichi_rts.rendering.painter import Painter, PictureOptions, level_classes, longest_step, milliseconds
+
+SCENE = rts.load_scene("dam_break_2d")
+NOTHING = SimpleNamespace()  # these tests draw no particles
+
+
+def simulation(stepper, levels, base_step=0.0005):
+    """What a painter asks a simulation for, four particles."""
+    return SimpleNamespace(
+        stepper=stepper,
+        schedule=SimpleNamespace(levels=levels),
+        base_step=base_step,
+        count=4,
+        time=0.25,
+        steps=lambda: np.array([1, 2, 4, 8]) * base_step,
+        leads=lambda: np.array([0, 1, 2, 9]) * base_step,
+    )
+
+
+def entries(sim, level):
+    return Painter(SCENE, PictureOptions(), renderer=NOTHING)._entries(sim, np.array(level))
+
+
+def test_regional_levels_have_an_entry_each():
+    got = entries(simulation(rts.Regional(levels=3), 3), [1, 2, 2, 2])
+    assert [(name, share) for name, _, share in got] == [
+        ("level 1: Δt_b", 0.25),
+        ("level 2: 2 Δt_b", 0.75),
+        ("level 3: 3 Δt_b", 0.0),
+    ]
+    assert np.allclose([colour for _, colour, _ in got], level_colours([1, 2, 3]))
+
+
+def test_asynchronous_levels_have_an_entry_an_octave():
+    got = entries(simulation(rts.Asynchronous(levels=8), 8), [1, 4, 6, 8])
+    assert [(name, share) for name, _, share in got] == [
+        ("level 1: Δt_b", 0.25),
+        ("level 2: 2 Δt_b", 0.0),
+        ("level 4–6: 4–6 Δt_b", 0.5),
+        ("level 8: 8 Δt_b", 0.25),
+    ]
+    assert np.allclose([colour for _, colour, _ in got], level_colours([1, 2, 3, 4]))
+
+
+def test_of_many_levels_only_those_in_use_have_an_entry():
+    got = entries(simulation(rts.Asynchronous(levels=1024), 1024), [1, 3, 1024, 1024])
+    assert [name for name, _, _ in got] == ["level 1: Δt_b", "level 3: 3 Δt_b", "level 1024: 1024 Δt_b"]
+    assert np.allclose(got[2][1], level_colours([11])[0])
+
+
+def test_classes_of_levels_keep_the_whole():
+    shares = np.arange(1.0, 21.0) / 210
+    for doubling, count in ((False, 20), (True, 5)):
+        classes = level_classes(shares, doubling)
+        assert len(classes) == count
+        assert sum(each.share for each in classes) == pytest.approx(1)
+    assert [str(each) for each in classes] == ["1", "2–3", "4–7", "8–15", "16–20"]
+
+
+@pytest.mark.parametrize(("mode", "values"), [("step", [1, 2, 4, 8]), ("lead", [0, 1, 2, 9])])
+def test_steps_and_leads_are_coloured_up_to_the_longest_step(mode, values, monkeypatch):
+    sim = simulation(rts.Asynchronous(levels=8), 8)
+    assert longest_step(sim) == pytest.approx(0.004)
+    painter = Painter(SCENE, PictureOptions(colour_by=mode), renderer=NOTHING)
+    got = painter.colours(sim, np.zeros((4, 2)), np.full(4, 1000.0), np.array([1, 2, 4, 8]))
+    assert np.allclose(got, scalar_colours(values, 0, 8))
+    bars = []
+    monkeypatch.setattr(legend, "draw_colour_bar", lambda image, *bar: bars.append(bar) or image)
+    painter._label(np.zeros((360, 640, 3), np.uint8), sim, np.array([1, 2, 4, 8]))
+    title, lower, upper, unit, _ = bars[0]
+    assert title == {"step": "step", "lead": "ahead of the youngest"}[mode]
+    assert (lower, upper, unit) == (0.0, pytest.approx(4.0), "ms")
+
+
+def test_short_base_steps_keep_their_digits():
+    assert [milliseconds(t) for t in (0.8128e-3, 0.1016e-3, 0.8819e-6)] == ["0.813", "0.102", "0.000882"]
