@@ -154,7 +154,6 @@ def _speed():
         )
         rows, walls = [], {}
         for label, stepper in SPEED_STEPPERS.items():
-            # the start is reached in the same state by the same cheap run for all that share one
             sim = rts.Simulation(scene, stepper)
             share = 0.1 if "smallest" in label else 1.0  # a part of its window, scaled
             begin = start if share == 1.0 else 0.0

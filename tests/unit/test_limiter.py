@@ -6,7 +6,7 @@ import taichi_rts as rts
 from taichi_rts import backend
 from taichi_rts.grid import BlockGrid, Geometry
 from taichi_rts.particles import Particles
-from taichi_rts.stepping.limiter import BlockLimiter
+from taichi_rts.stepping.limiter import BlockLimiter, NeighbourLimiter
 from taichi_rts.stepping.regional import RegionalSchedule
 
 EMPTY = BlockLimiter.EMPTY
@@ -68,3 +68,57 @@ def test_grading_leaves_jumps_of_one_and_only_lowers(taichi_cpu, levels):
     assert (graded <= np.minimum(raw, lowest_neighbour(geometry, raw)))[occupied].all()
     assert (graded <= lowest_neighbour(geometry, graded) + 1)[occupied].all()
     assert set(graded[occupied]) == set(range(1, levels + 1))
+
+
+def settled(limiter, cases):
+    """Run `NeighbourLimiter.settled` on rows of wanted step, current step and tick."""
+    table = np.array(cases, dtype=np.int32)
+    found = np.empty(len(table), dtype=np.int32)
+
+    @ti.kernel
+    def run(table: ti.types.ndarray(), found: ti.types.ndarray()):
+        for k in range(found.shape[0]):
+            found[k] = limiter.settled(table[k, 0], table[k, 1], table[k, 2])
+
+    run(table, found)
+    return found.tolist()
+
+
+def test_steps_shrink_at_once_and_grow_by_one_level_when_synchronised(taichi_cpu):
+    doubling, counting = NeighbourLimiter(doubling=True), NeighbourLimiter(doubling=False)
+    free = NeighbourLimiter(doubling=True, aligned=False)
+    assert settled(doubling, [(1, 8, 3), (8, 8, 3), (8, 2, 4), (8, 2, 6), (4, 2, 2), (8, 1, 2)]) == [1, 8, 4, 2, 2, 2]
+    assert settled(counting, [(1, 3, 5), (3, 1, 2), (3, 1, 3), (3, 2, 6), (3, 2, 4)]) == [1, 2, 1, 3, 2]
+    assert settled(free, [(9, 3, 7), (5, 3, 7), (2, 3, 7)]) == [6, 5, 2]
+
+
+def test_a_woken_step_ends_now_or_where_twice_the_neighbours_step_would_have(taichi_cpu):
+    limiter = NeighbourLimiter(doubling=True)
+    cases = np.array([(0, 8, 3, 1), (0, 8, 3, 2), (0, 8, 1, 1), (4, 2, 4, 1), (0, 3, 2, 5)], dtype=np.int32)
+    ends = np.empty(len(cases), dtype=np.int32)
+
+    @ti.kernel
+    def run(cases: ti.types.ndarray(), ends: ti.types.ndarray()):
+        for k in range(ends.shape[0]):
+            ends[k] = limiter.woken_end(cases[k, 0], cases[k, 1], cases[k, 2], cases[k, 3])
+
+    run(cases, ends)
+    assert ends.tolist() == [3, 4, 2, 6, 3]
+
+
+def test_the_limiter_of_regions_halves_the_step_at_most_from_block_to_block(taichi_cpu):
+    scene = rts.Scene(domain=rts.Box((0, 0), (2, 1)), fluids=[rts.Block((0, 0), (0.4, 0.4))], spacing=0.05)
+    geometry = Geometry((0, 0), (2, 1), scene.support)
+    state = Particles(np.zeros((1, 2)), np.zeros((1, 2)), 1000.0, backend.current())
+    schedule = RegionalSchedule(rts.Regional(levels=8, limiter=True), scene, state, BlockGrid(geometry, 1))
+    raw = random_levels(geometry, n_max=8)
+    occupied = raw != EMPTY
+    raw[occupied] = 8
+    raw[np.flatnonzero(occupied)[[3, 100]]] = 1
+    schedule.raw_level.from_numpy(raw)
+    schedule.apply_minimum_region()
+    limited = schedule.block_level.to_numpy()
+    assert (limited[~occupied] == EMPTY).all()
+    assert (limited <= np.minimum(raw, lowest_neighbour(geometry, raw)))[occupied].all()
+    assert (limited <= 2 * lowest_neighbour(geometry, limited))[occupied].all()
+    assert set(limited[occupied]) == {1, 2, 4, 8}

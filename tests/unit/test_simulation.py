@@ -84,3 +84,35 @@ def test_reordering_does_not_depend_on_output_times(taichi_cpu_f64, monkeypatch)
     for n in range(8):
         sim.advance_to((n + 1) * 0.25 * REORDER_EVERY * sim.base_step)  # the first sort was at tick 0
     assert len(calls) == 2
+
+
+def test_momentum_is_accounted_for_by_gravity_and_walls(taichi_cpu_f64):
+    block = rts.Block((0, 0), (0.4, 0.8))
+    scene = rts.Scene(domain=rts.Box((0, 0), (1, 1)), fluids=[block], spacing=0.05, sound_speed=40.0)
+    sim = rts.Simulation(scene, rts.Uniform(), debug=True)
+    assert np.abs(sim.momentum_drift()).max() < 1e-12
+    sim.advance_to(0.0503)
+    assert np.linalg.norm(sim.momentum()) > 1.0
+    assert np.abs(sim.momentum_drift()).max() < 1e-9
+
+
+def test_the_momentum_budget_needs_a_debug_run(taichi_cpu_f64):
+    with pytest.raises(rts.Error, match="debug=True"):
+        rts.Simulation(SMALL).momentum_drift()
+
+
+def test_debug_runs_stop_at_what_must_not_happen(taichi_cpu_f64):
+    scene = rts.Scene(domain=rts.Box((0, 0), (1, 1)), fluids=[rts.Block((0, 0), (0.4, 0.4))], spacing=0.04)
+    sim = rts.Simulation(scene, rts.Asynchronous(steps="integers", stagger=1), debug=True)
+    while sim.schedule.begin(sim.timeline, 40):
+        if not sim.schedule.needs_sorting:
+            break
+        sim.step()
+    level = sim.particles.level.to_numpy()
+    level[::2] -= 100
+    sim.particles.level.from_numpy(level)  # as if half of the steps had ended long ago
+    with pytest.raises(AssertionError, match="particles extrapolated near tick"):
+        sim.step()
+    sim.particles.level.from_numpy(level - 100)
+    with pytest.raises(AssertionError, match="no cell may step at tick"):
+        sim.step()
