@@ -54,8 +54,8 @@ class Run:
     """Regional, asynchronous: density of particles that are not due."""
     steps: Literal["powers_of_two", "integers"] | None = None
     """Asynchronous: lengths that steps may have, in base steps; powers_of_two keeps blocks in step with each other."""
-    limiter: bool = True
-    """Asynchronous: bound a block's step by its neighbours', and wake neighbours whose step is too long."""
+    limiter: bool | None = None
+    """Regional, asynchronous: bound a block's step by its neighbours' and by its last, and wake neighbours."""
     stagger: int | None = None
     """Asynchronous: seed of random first steps, so that all blocks have different ages."""
     integrator: Literal["serna", "symplectic_euler"] | None = None
@@ -94,6 +94,8 @@ class Run:
     """Several panels in a frame: the paper's Figure 3 or 2, or one for each stepper. They have their own steppers."""
     video: bool = False
     """Also write video.mp4 (needs the extra `video`)."""
+    debug: bool = False
+    """Check at run time what steppers promise (nobody is extrapolated, somebody steps in every pass); adds up momentum."""
     gui: bool = False
     """Watch in a window instead of saving frames (needs Vulkan and a display)."""
 
@@ -119,7 +121,7 @@ class Run:
         frames = len(frame_times(scene.end_time, self.export_fps))
         check_size(self.width, self.height)
         device = rts.init(self.arch, self.precision)
-        recorder = Recorder(scene, panels, options, recording)
+        recorder = Recorder(scene, panels, options, recording, debug=self.debug)
         with report.progress(recorder.runs, scene.end_time, device) as on_frame:
             recorder.record(scene.end_time, on_frame)
         for stepper, sim in recorder.runs.items():
@@ -156,8 +158,8 @@ STEPPER_OPTIONS = sorted({key for kind in STEPPERS.values() for key in kind.__da
 
 
 def flags(keys: list[str]) -> str:
-    """Return options of `Run` as a user has to write them to change their default."""
-    return ", ".join(f"--{'no-' if getattr(Run, key) is True else ''}{key.replace('_', '-')}" for key in keys)
+    """Return options of `Run` as a user writes them."""
+    return ", ".join(f"--{key.replace('_', '-')}" for key in keys)
 
 
 @dataclasses.dataclass(frozen=True)

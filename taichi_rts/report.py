@@ -9,6 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
@@ -77,6 +78,13 @@ def print_table(sim: Simulation, initial_energy: Energy) -> None:
         facts.add_row("speed-up bound", f"{bound:.2f} over uniform steps of the base step")
     for name, fact in pass_facts(statistics):
         facts.add_row(name, fact)
+    if sim.particles.has_budget and sim.scene.body_force is None:
+        share = np.linalg.norm(sim.momentum_drift()) / (
+            sim.medium.mass * sim.count * max(sim.scene.estimate_max_speed(), 1e-9)
+        )
+        facts.add_row("momentum drift", f"{share:.1e} of the mass times the largest speed")
+    if statistics.get("extrapolations") is not None:
+        facts.add_row("extrapolations", str(statistics["extrapolations"]))
     facts.add_row("energy drift", f"{drift:+.2%} of {initial_energy.total:.4g} J")
     facts.add_row("stopped by the box", f"{statistics['stopped_by_domain']} centres")
     if statistics["runaways"]:

@@ -37,15 +37,17 @@ class Recording:
 class Recorder:
     """Records one or more simulations of one scene, each shown in one or more panels, side by side in each frame."""
 
-    def __init__(self, scene: Scene, panels: list[Panel], options: PictureOptions, recording: Recording) -> None:
+    def __init__(
+        self, scene: Scene, panels: list[Panel], options: PictureOptions, recording: Recording, *, debug: bool = False
+    ) -> None:
         if recording.video:
             require_video()
         prepare_folder(recording.folder, recording.overwrite)
         self.scene = scene
         self.panels = panels
         self.recording = recording
-        self.simulations = {panel.stepper: None for panel in panels}
-        self.runs = {stepper: Simulation(scene, stepper) for stepper in self.simulations}
+        steppers = dict.fromkeys(panel.stepper for panel in panels)  # one run for all panels that show it
+        self.runs = {stepper: Simulation(scene, stepper, debug=debug) for stepper in steppers}
         self.initial_energy = {stepper: sim.energy() for stepper, sim in self.runs.items()}
         if len(panels) > 1:
             options = dataclasses.replace(options, height=options.height // 2 // 2 * 2)

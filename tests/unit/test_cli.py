@@ -89,7 +89,7 @@ def test_existing_output_is_kept(two_runs):
         (["run", "dam_break", "--levels", "0"], ["levels", "0"]),
         (["run", "dam_break", "--stepper", "uniform", "--levels", "3"], ["--levels", "uniform"]),
         (["run", "dam_break", "--stepper", "uniform", "--stagger", "1"], ["--stagger", "uniform"]),
-        (["run", "dam_break", "--no-limiter"], ["--no-limiter", "regional"]),
+        (["run", "dam_break", "--stepper", "uniform", "--limiter", "True"], ["--limiter", "uniform"]),
         (["run", "dam_break", "--stepper", "asynchronous", "--preset", "paper"], ["--preset", "asynchronous"]),
         (["run", "dam_break", "--stepper", "asynchronous", "--levels", "6"], ["levels 6", "use 4 or 8"]),
         (["run", "dam_break", "--panels", "figure3", "--levels", "3"], ["--panels figure3", "--levels"]),
@@ -128,11 +128,11 @@ def test_a_demos_preset_holds_for_its_own_stepper_only():
 
 
 def test_every_option_of_the_asynchronous_stepper_can_be_given():
-    args = ["--steps", "integers", "--no-limiter", "--stagger", "7", "--levels", "6", "--lambda-f", "0.1"]
+    args = ["--steps", "integers", "--limiter", "False", "--stagger", "7", "--levels", "6", "--lambda-f", "0.1"]
     args += ["--courant", "0.8", "--inactive-density", "stale"]
     wanted = rts.Asynchronous(0.8, 6, "integers", 0.1, limiter=False, inactive_density="stale", stagger=7)
     assert parse("--stepper", "asynchronous", *args).make_stepper() == wanted
-    assert parse("--stepper", "asynchronous", "--limiter").make_stepper() == rts.Asynchronous()
+    assert parse("--limiter", "True").make_stepper() == rts.Regional(preset="paper", limiter=True)
     assert set(rts.Asynchronous.__dataclass_fields__) - {"name"} <= set(cli.STEPPER_OPTIONS)
 
 
