@@ -139,8 +139,13 @@ class Motion:
             present = now + read_at[self.grid.block(i)]
             dt = self.elapsed(i, present, tick)
             a = self.particles.a[i]
-            a_walls = self.momentum.wall_acceleration(k)
-            a_new = self.momentum.other_acceleration(k) + a_walls
+            by_walls = self.momentum.wall_rates(k)
+            rates = self.momentum.other_rates(k) + by_walls
+            a_new = a
+            for d in ti.static(range(self.particles.dim)):
+                a_new[d] = rates[d]
+            if ti.static(self.particles.has_rho_rate):
+                self.particles.rho_rate[i] = rates[self.particles.dim]
             x = self.integrator.correct_position(self.near.x[k], a, a_new, dt)
             v = self.integrator.correct_velocity(self.particles.v[i], a, a_new, dt)
             v, a_new = self.limit(v, self.largest_speed), self.limit(a_new, self.largest_acceleration)
@@ -158,6 +163,11 @@ class Motion:
                     if (x[d] - inside[d]) * v[d] > 0.0:
                         v[d] = 0.0
             if ti.static(self.particles.has_budget):
+                a_walls = a
+                for d in ti.static(range(self.particles.dim)):
+                    a_walls[d] = by_walls[d]
+                if ti.static(self.particles.has_past):
+                    self.particles.past_wall_push[i] = self.particles.wall_push[i]
                 self.particles.wall_push[i] += (0.5 * dt) * (self.particles.a_walls[i] + a_walls) + v - v_free
                 self.particles.a_walls[i] = a_walls
             if ti.static(self.particles.has_past):
@@ -192,4 +202,6 @@ class Motion:
                 x[identity, d] = position[d]
                 v[identity, d] = velocity[d]
             rho[identity] = self.particles.rho[i]
+            if ti.static(self.particles.has_past):
+                rho[identity] = self.density(i, dt, tick)
             level[identity] = ti.max(self.particles.level[i], 1)

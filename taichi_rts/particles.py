@@ -61,6 +61,8 @@ class Particles:
         if with_budget:
             self.a_walls = vector_field(self.dim, backend.dtype, self.count)
             self.wall_push = vector_field(self.dim, backend.dtype, self.count)
+            if with_past:
+                self.past_wall_push = vector_field(self.dim, backend.dtype, self.count)
         self.real_scratch = ti.field(backend.dtype, self.count)
         self.integer_scratch = ti.field(ti.i32, self.count)
         self.x.from_numpy(positions.astype(backend.numpy_dtype))
@@ -90,6 +92,7 @@ class Particles:
     def _real_fields(self) -> list[ti.Field]:
         vectors = [self.x, self.v, self.a] + ([self.past_x, self.past_v] if self.has_past else [])
         vectors += [self.a_walls, self.wall_push] if self.has_budget else []
+        vectors += [self.past_wall_push] if self.has_budget and self.has_past else []
         scalars = (
             [self.rho] + ([self.past_rho] if self.has_past else []) + ([self.rho_rate] if self.has_rho_rate else [])
         )

@@ -113,6 +113,11 @@ def pass_facts(statistics: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("passes", f"{statistics['passes']:,} in {statistics['cycles']:,} cycles"),
         ("cells in a pass", f"{cells['min']:,} to {cells['max']:,}, median {cells['median']:,.0f}"),
         ("woken", f"{statistics['wakes']:,} particles"),
+        *(
+            [("[bold]steps too long[/]", f"{statistics['clamped']:,}: use more --levels")]
+            if statistics["clamped"]
+            else []
+        ),
     ]
 
 

@@ -62,7 +62,15 @@ class Simulation:
         self.density = SummationDensity(self.particles, self.near, self.grid, self.walls, self.medium, backend)
         terms = [Pressure(self.near), *viscosity_terms(scene, self.medium, self.near)]
         momentum = MomentumEquation(
-            terms, self.near, self.grid, self.walls, self.medium, scene.acceleration, backend, scene.body_force
+            terms,
+            self.near,
+            self.grid,
+            self.walls,
+            self.medium,
+            scene.acceleration,
+            backend,
+            scene.body_force,
+            with_rho_rate=self.particles.has_rho_rate,
         )
         self.motion = Motion(
             self.particles,
@@ -175,11 +183,11 @@ class Simulation:
         return self.state()[1]
 
     def densities(self) -> np.ndarray:
-        """Densities [kg/m^3], (N,), of each particle's last evaluation, in order of particle id."""
+        """Densities [kg/m^3], (N,), by particle id: of each particle's last evaluation, with `Asynchronous` at `time`."""
         return self.state()[2]
 
     def pressures(self) -> np.ndarray:
-        """Pressures [Pa], (N,), of each particle's last evaluation, in order of particle id."""
+        """Pressures [Pa], (N,), by particle id, that belong to `densities`."""
         return self.medium.equation_of_state.pressure_numpy(self.densities())
 
     def levels(self) -> np.ndarray:
@@ -236,5 +244,10 @@ class Simulation:
         p = self.particles
         elapsed = self._time - p.updated.to_numpy() * self.timeline.tick
         walls = p.wall_push.to_numpy().astype(float) + elapsed[:, None] * p.a_walls.to_numpy()
+        if p.has_past and (ahead := elapsed < 0.0).any():  # whose velocity is interpolated between two evaluations
+            step = (p.updated.to_numpy() - p.past_updated.to_numpy())[ahead] * self.timeline.tick
+            share = (-elapsed[ahead] / step)[:, None]
+            now, before = (field.to_numpy()[ahead].astype(float) for field in (p.wall_push, p.past_wall_push))
+            walls[ahead] = now + share * (before - now)
         gravity = self.count * self._time * np.asarray(self.scene.acceleration)
         return self.momentum() - self._initial_momentum - self.medium.mass * (walls.sum(axis=0) + gravity)

@@ -15,8 +15,7 @@ from taichi_rts.physics.walls import Walls
 class SummationDensity:
     """rho_i = sum_j m W_ij + sum_b rho_0 V_b W_ib (Monaghan 1992; walls: Akinci et al. 2012, Eq. 6).
 
-    With `Particles.rho_rate` present its rate d rho_i/dt = sum_j m v_ij . grad W_ij comes out of the same loop (walls are
-    at rest), so that the density of a particle that is not due can be extrapolated.
+    Its rate of change comes out of the momentum equation's loop, which has grad W at hand (`MomentumEquation`).
     """
 
     def __init__(
@@ -34,33 +33,25 @@ class SummationDensity:
         self.walls: Any = walls
         self.has_walls = walls is not None
         self.equation_of_state = medium.equation_of_state
-        self.with_rate = particles.has_rho_rate
         self.keeps_past = particles.has_past
         kernel, mass, rest_density = medium.kernel, medium.mass, medium.rest_density
         tiny = (1e-6 * medium.support) ** 2
-        width = 2 if self.with_rate else 1
 
         @ti.func
-        def contribution(x_ij, v_ij):
-            """W and, if wanted, v . grad W."""
-            d = ti.sqrt(x_ij.norm_sqr() + tiny)
-            value = ti.Vector.zero(backend.dtype, width)
-            value[0] = kernel.value(d)
-            if ti.static(width == 2):
-                value[1] = kernel.gradient_factor(d) * v_ij.dot(x_ij)
-            return value
+        def value(x_ij):
+            return ti.Vector([kernel.value(ti.sqrt(x_ij.norm_sqr() + tiny))])
 
         @ti.func
         def fluid_pair(i, j):
-            return mass * contribution(near.x[i] - near.x[j], near.v[i] - near.v[j])
+            return mass * value(near.x[i] - near.x[j])
 
         @ti.func
         def wall_pair(i, b):
-            return rest_density * walls.volume[b] * contribution(near.x[i] - walls.x[b], near.v[i])
+            return rest_density * walls.volume[b] * value(near.x[i] - walls.x[b])
 
-        self.sum_fluid = make_neighbour_sum(grid.geometry, grid.start, fluid_pair, width, backend)
+        self.sum_fluid = make_neighbour_sum(grid.geometry, grid.start, fluid_pair, 1, backend)
         if walls is not None:
-            self.sum_walls = make_neighbour_sum(grid.geometry, walls.start, wall_pair, width, backend)
+            self.sum_walls = make_neighbour_sum(grid.geometry, walls.start, wall_pair, 1, backend)
 
     @ti.kernel
     def update(self, due: ti.template(), due_count: ti.template()):
@@ -79,5 +70,3 @@ class SummationDensity:
             self.near.rho[k] = rho
             self.near.p_over_rho2[k] = self.equation_of_state.pressure(rho) / (rho * rho)
             self.particles.rho[i] = rho
-            if ti.static(self.with_rate):
-                self.particles.rho_rate[i] = total[1]

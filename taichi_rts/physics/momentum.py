@@ -38,7 +38,11 @@ class Pressure:
 
 @ti.data_oriented
 class MomentumEquation:
-    """Adds up the terms' accelerations for one particle.
+    """Adds up the terms' accelerations for one particle, and with them, if wanted, the rate of its density.
+
+    The rate is d rho_i/dt = sum_j m v_ij . grad W_ij + sum_b rho_0 V_b v_i . grad W_ib, the derivative of `SummationDensity`
+    beside walls at rest; with it the density of a particle that is not due can be carried through its step. Both come as one
+    vector of "rates": dv/dt [m/s^2], (dim,), and with `with_rho_rate` as its last entry d rho/dt [kg/(m^3 s)].
 
     A term is an object with two ti.funcs, `fluid_pair(i, j, x_ij, d2)` and `wall_pair(i, b, x_ib, d2)`, that return the
     acceleration per unit of mass times gradient factor (see `smoothing`), as a vector.
@@ -54,6 +58,8 @@ class MomentumEquation:
         gravity: Sequence[float],
         backend: Backend,
         body_force: LinearField | None = None,
+        *,
+        with_rho_rate: bool = False,
     ) -> None:
         self.grid = grid
         self.near = near
@@ -65,10 +71,21 @@ class MomentumEquation:
         if body_force is not None:
             self.force_gradient = body_force.gradient
             self.force_origin, self.force_value = body_force.base
-        dim = grid.geometry.dim
+        self.dim = dim = grid.geometry.dim
+        self.width = width = dim + int(with_rho_rate)
         kernel, mass, rest_density = medium.kernel, medium.mass, medium.rest_density
         tiny = (1e-6 * medium.support) ** 2  # keeps grad W of a particle on itself, which is zero, from becoming 0/0
         terms = list(terms)
+
+        @ti.func
+        def rates(acceleration, v_ij, x_ij):
+            """Put the contribution to the density's rate, per unit of gradient factor, behind the acceleration."""
+            result = ti.Vector.zero(backend.dtype, width)
+            for d in ti.static(range(dim)):
+                result[d] = acceleration[d]
+            if ti.static(width > dim):
+                result[dim] = v_ij.dot(x_ij)
+            return result
 
         @ti.func
         def fluid_pair(i, j):
@@ -77,7 +94,7 @@ class MomentumEquation:
             acceleration = ti.Vector.zero(backend.dtype, dim)
             for term in ti.static(terms):
                 acceleration += term.fluid_pair(i, j, x_ij, d2)
-            return mass * kernel.gradient_factor(ti.sqrt(d2 + tiny)) * acceleration
+            return mass * kernel.gradient_factor(ti.sqrt(d2 + tiny)) * rates(acceleration, near.v[i] - near.v[j], x_ij)
 
         @ti.func
         def wall_pair(i, b):
@@ -86,16 +103,17 @@ class MomentumEquation:
             acceleration = ti.Vector.zero(backend.dtype, dim)
             for term in ti.static(terms):
                 acceleration += term.wall_pair(i, b, x_ib, d2)
-            return rest_density * walls.volume[b] * kernel.gradient_factor(ti.sqrt(d2 + tiny)) * acceleration
+            factor = rest_density * walls.volume[b] * kernel.gradient_factor(ti.sqrt(d2 + tiny))
+            return factor * rates(acceleration, near.v[i], x_ib)
 
-        self.sum_fluid = make_neighbour_sum(grid.geometry, grid.start, fluid_pair, dim, backend)
+        self.sum_fluid = make_neighbour_sum(grid.geometry, grid.start, fluid_pair, width, backend)
         if walls is not None:
-            self.sum_walls = make_neighbour_sum(grid.geometry, walls.start, wall_pair, dim, backend)
+            self.sum_walls = make_neighbour_sum(grid.geometry, walls.start, wall_pair, width, backend)
 
     @ti.func
-    def wall_acceleration(self, k):
-        """The walls' share of the acceleration [m/s^2], (dim,), of the particle at place `k`."""
-        total = ti.Vector.zero(self.dtype, self.grid.geometry.dim)
+    def wall_rates(self, k):
+        """The walls' share of the rates, (width,), of the particle at place `k`."""
+        total = ti.Vector.zero(self.dtype, self.width)
         if ti.static(self.has_walls):
             i = self.grid.order[k]
             if self.walls.near[self.grid.block(i)] == 1:
@@ -103,15 +121,15 @@ class MomentumEquation:
         return total
 
     @ti.func
-    def other_acceleration(self, k):
-        """All but the walls' share of the acceleration [m/s^2], (dim,), of the particle at place `k`."""
+    def other_rates(self, k):
+        """All but the walls' share of the rates, (width,), of the particle at place `k`."""
         x = self.near.x[k]
         total = self.sum_fluid(k, x, self.grid.cell_of[self.grid.order[k]])
-        for d in ti.static(range(self.grid.geometry.dim)):
+        for d in ti.static(range(self.dim)):
             total[d] += self.gravity[d]
         if ti.static(self.has_body_force):
-            for d in ti.static(range(self.grid.geometry.dim)):
+            for d in ti.static(range(self.dim)):
                 total[d] += self.force_value[d]
-                for e in ti.static(range(self.grid.geometry.dim)):
+                for e in ti.static(range(self.dim)):
                     total[d] += self.force_gradient[d][e] * (x[e] - self.force_origin[e])
         return total

@@ -88,7 +88,7 @@ class Painter:
             leads=sim.leads() if mode == "lead" else None,
             rest_density=self.scene.rest_density,
             max_speed=self.top_speed,
-            longest_step=longest_step(sim),
+            longest_step=longest_lead(sim) if mode == "lead" else longest_step(sim),
             palette=self.options.palette,
             doubling=sim.schedule.levels_double,
         )
@@ -115,13 +115,13 @@ class Painter:
         ]
 
     def _step_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
-        return self._milliseconds_bar(image, sim, "step")
+        return self._milliseconds_bar(image, "step", longest_step(sim))
 
     def _lead_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
-        return self._milliseconds_bar(image, sim, "ahead of the youngest")
+        return self._milliseconds_bar(image, "ahead of the youngest", longest_lead(sim))
 
-    def _milliseconds_bar(self, image: np.ndarray, sim: Simulation, title: str) -> np.ndarray:
-        lower, upper = colours.step_range([], longest_step(sim))
+    def _milliseconds_bar(self, image: np.ndarray, title: str, longest: float) -> np.ndarray:
+        lower, upper = colours.step_range([], longest)
         values = np.linspace(lower, upper, BAR_STEPS)
         tints = colours.colour_by("step", steps=values, longest_step=upper)
         return legend.draw_colour_bar(image, title, 1e3 * lower, 1e3 * upper, "ms", tints)
@@ -149,6 +149,11 @@ _BARS = {
 def longest_step(sim: Simulation) -> float:
     """The longest step [s] that the stepper can take."""
     return sim.schedule.levels * sim.base_step
+
+
+def longest_lead(sim: Simulation) -> float:
+    """Longest time [s] by which a cell can be ahead of the youngest: it begins its last step at most one step ahead."""
+    return (2 if sim.schedule.levels_double else 1) * longest_step(sim)
 
 
 def milliseconds(time: float) -> str:

@@ -19,6 +19,7 @@ import taichi as ti
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from taichi_rts import backend
 from taichi_rts.errors import StepperError
 from taichi_rts.grid import BlockGrid
 from taichi_rts.integrators.serna import Serna
@@ -164,19 +165,22 @@ class AsynchronousSchedule(Schedule):
         self.step.fill(self.EMPTY)
         self.youngest = ti.field(ti.i32, ())
         self.stepping = ti.field(ti.i32, ())
-        self.speed2 = ti.field(float, ())
-        self.acceleration2 = ti.field(float, ())
+        self.drift_time = ti.field(float, ())
         self.passes = ti.field(ti.i32, ())
+        self.passes_in_cycle = ti.field(ti.i32, ())
         self.widths = ti.field(ti.i32, LOG)
         self.wakes = ti.field(ti.i32, ())
+        self.clamped = ti.field(ti.i32, ())
         self.extrapolated = ti.field(ti.i32, ())
         self.updates = ti.field(ti.i32, self.levels + 1)
         self.target = 0
-        self.cycle_end = self.cycle_length()
+        self.cycle_end = 1  # of the evaluation at tick 0, before which no acceleration is known
         self.cycles = 1
         self.launched = 0
-        self.blind = self.in_cycle = 0
+        self.blind = 0
+        self.reads_are_slow = backend.current().arch != "cpu"
         self.seen_widths: list[np.ndarray] = []
+        self.all_wakes = self.all_clamped = 0
 
     # -- what the host decides: cycles ------------------------------------------------------------------------------
 
@@ -193,33 +197,35 @@ class AsynchronousSchedule(Schedule):
         if youngest < self.cycle_end:
             return self.launch(False)
         timeline.now = self.steps = youngest
-        length = self.cycle_length()
-        self.cycle_end = (timeline.now // length + 1) * length
+        self.cycle_end = timeline.now + self.cycle_length(youngest)
         self.cycles += 1
-        self.blind, self.in_cycle = max(0, self.in_cycle - 2), 0
+        if self.reads_are_slow:
+            self.blind = max(0, int(self.passes_in_cycle[None]) - 1)
         return self.launch(True)
 
     def launch(self, needs_sorting: bool) -> bool:
-        """Note that a pass begins. All but the last few of a cycle are launched blindly; idle ones would change nothing."""
+        """Note that a pass begins.
+
+        On a GPU as many passes as the last cycle needed are launched without looking; idle ones change nothing.
+        """
         self.needs_sorting = needs_sorting
-        self.in_cycle += 1
         self.launched += 1
         if self.launched == LOG:
             self.collect_widths()
         return True
 
-    def cycle_length(self) -> int:
-        """Ticks that the coming cycle may take: as long as nobody drifts further than the grid allows."""
+    def cycle_length(self, now: int) -> int:
+        """Ticks that the cycle from tick `now` may take: as long as nobody drifts further than the grid allows.
+
+        Judged by speeds and accelerations at its start, so an impact within the cycle may exceed it a little; a pair that is
+        missed then lies at the very edge of the support radius.
+        """
         if self.levels == 1:
             return 1
-        self.reduce_maxima()
-        speed, acceleration = math.sqrt(self.speed2[None]), math.sqrt(self.acceleration2[None])
-        longest = self.levels * self.tick
-        drift = (speed + 0.5 * acceleration * longest) * self.tick  # [m] per tick
-        allowed = self.grid.geometry.drift
-        ticks = min(self.levels, math.floor(allowed / drift)) if 0.0 < drift < math.inf else self.levels
-        ticks = max(1, ticks)
-        return 1 << (ticks.bit_length() - 1) if self.powers_of_two else ticks
+        self.find_drift_time(now, self.tick)
+        ticks = self.drift_time[None] / self.tick
+        # Readers are at most one tick short of the cycle's end.
+        return min(self.levels, math.floor(ticks) + 1) if ticks > 0.0 else 1
 
     @ti.kernel
     def find_youngest(self):
@@ -229,15 +235,21 @@ class AsynchronousSchedule(Schedule):
             ti.atomic_min(self.youngest[None], self.time[self.occupied[m]])
 
     @ti.kernel
-    def reduce_maxima(self):
-        self.speed2[None] = 0.0
-        self.acceleration2[None] = 0.0
+    def find_drift_time(self, now: ti.i32, tick: float):
+        """The shortest time [s] from `now` in which |v| t + |a| t^2/2 of some particle is all the drift that the grid allows."""
+        self.drift_time[None] = self.levels * self.tick
         for i in range(self.particles.count):
-            ti.atomic_max(self.speed2[None], self.particles.v[i].norm_sqr())
-            ti.atomic_max(self.acceleration2[None], self.particles.a[i].norm_sqr())
+            a = self.particles.a[i].norm()
+            elapsed = ti.cast(now - self.particles.updated[i], float) * tick
+            v = (self.particles.v[i] + self.particles.a[i] * elapsed).norm()
+            drift = ti.static(self.grid.geometry.drift)
+            reach = v + ti.sqrt(v * v + 2.0 * a * drift)
+            if reach * ti.static(self.levels * self.tick) > 2.0 * drift:
+                ti.atomic_min(self.drift_time[None], 2.0 * drift / reach)
 
     def sorted(self, now: int, tick: float) -> None:
         """Find the occupied cells, their times and steps."""
+        self.passes_in_cycle[None] = 0
         self.forget_cells()
         self.occupied_scan.run()
         self.list_occupied()
@@ -320,7 +332,7 @@ class AsynchronousSchedule(Schedule):
 
     @ti.kernel
     def choose_cells(self):
-        """Ready cells step if their whole neighbourhood is theirs; others wait for a later pass, which changes nothing."""
+        """Ready cells step if their whole neighbourhood is theirs; the others wait for a later pass."""
         for m in range(self.occupied_count[None]):
             block = self.occupied[m]
             time = self.ready[block]
@@ -396,15 +408,21 @@ class AsynchronousSchedule(Schedule):
 
     @ti.kernel
     def propose_steps(self, now: ti.i32, tick: float):
-        """The longest step that the CFL condition and the force limit of a cell's particles allow, in ticks."""
+        """The longest step that the CFL condition and the force limit of a cell's particles allow, in ticks.
+
+        In a cell of mixed ages it ends when the older particles' steps end, so that from then on all move together.
+        """
         for m in range(self.occupied_count[None]):
             block = self.occupied[m]
             step = self.step[block]
             if self.block_due[block] > 0:
                 time = self.time[block]
                 speed2, acceleration2 = 0.0, 0.0
+                meeting = self.EMPTY  # when the cell's older particles end their steps, if it has some
                 for k in range(self.grid.first(block), self.grid.first(block + 1)):
                     i = self.grid.order[k]
+                    if self.particles.updated[i] < time:
+                        meeting = ti.min(meeting, self.end(i))
                     a = self.particles.a[i]
                     v = self.particles.v[i] + a * (ti.cast(time - self.particles.updated[i], float) * tick)
                     speed2, acceleration2 = ti.max(speed2, v.norm_sqr()), ti.max(acceleration2, a.norm_sqr())
@@ -416,7 +434,7 @@ class AsynchronousSchedule(Schedule):
                 if ti.static(self.stepper.limiter):
                     if step > 0:  # the first step has none to grow from
                         wanted = self.rounded(self.limiter.settled(wanted, step, time))
-                step = self.aligned(wanted, time)
+                step = self.rounded(ti.min(self.aligned(wanted, time), meeting - time))
             self.proposal[block] = step
 
     @ti.func
@@ -427,6 +445,8 @@ class AsynchronousSchedule(Schedule):
             step = ti.min(step, self.fast_reach / ((self.scene.wave_speed + speed) * tick))
         if acceleration > 0.0:
             step = ti.min(step, self.stepper.lambda_f * ti.sqrt(self.scene.support / acceleration) / tick)
+        if step < 1.0:
+            self.clamped[None] += 1
         return ti.max(1, ti.cast(ti.floor(step), ti.i32))
 
     @ti.func
@@ -479,7 +499,8 @@ class AsynchronousSchedule(Schedule):
             for m in range(self.occupied_count[None]):
                 block = self.occupied[m]
                 if self.read_at[block] >= 0:
-                    shortest = self.EMPTY
+                    # A cell's own older particles, which did not step with the others, are woken as well.
+                    shortest = self.step[block] if self.block_due[block] > 0 else self.EMPTY
                     for stride in ti.static(self.grid.geometry.neighbour_strides):
                         if self.block_due[block + stride] > 0:
                             shortest = ti.min(shortest, self.step[block + stride])
@@ -502,7 +523,7 @@ class AsynchronousSchedule(Schedule):
             end = self.limiter.woken_end(began, step, now, shortest)
             if end < began + step:
                 self.particles.level[i] = end - began
-                self.wakes[None] += 1
+                self.wakes[None] += ti.cast(began < now, ti.i32)
 
     @ti.kernel
     def log_pass(self):
@@ -510,6 +531,7 @@ class AsynchronousSchedule(Schedule):
         if self.stepping[None] > 0:
             self.widths[self.passes[None] % LOG] = self.stepping[None]
             self.passes[None] += 1
+            self.passes_in_cycle[None] += 1
 
     # -- what the run has to say ------------------------------------------------------------------------------------
 
@@ -523,17 +545,21 @@ class AsynchronousSchedule(Schedule):
         """Return base steps spent at each step length, and updates, since the last call."""
         updates = self.updates.to_numpy()[1:].astype(np.int64)
         self.updates.fill(0)
+        self.all_wakes += int(self.wakes[None])
+        self.all_clamped += int(self.clamped[None])
+        self.wakes[None] = self.clamped[None] = 0
         self.collect_widths()
         return (updates * np.arange(1, self.levels + 1)).tolist(), updates.tolist()
 
     def statistics(self) -> dict[str, Any]:
-        """Return passes, cells per pass, cycles (sorts of the grid) and particles woken."""
+        """Return passes, cells per pass, cycles (sorts of the grid), particles woken, cells for which a tick was too long."""
         widths = np.concatenate(self.seen_widths) if self.seen_widths else np.zeros(0, np.int32)
         some = widths if len(widths) else np.zeros(1, np.int32)
         return {
             "passes": len(widths),
             "cells_per_pass": {"min": int(some.min()), "median": float(np.median(some)), "max": int(some.max())},
             "cycles": self.cycles,
-            "wakes": int(self.wakes[None]),
+            "wakes": self.all_wakes,
+            "clamped": self.all_clamped,
             "extrapolations": int(self.extrapolated[None]) if self.debug else None,
         }

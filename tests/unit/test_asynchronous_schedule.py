@@ -196,7 +196,7 @@ def test_neighbours_are_limited_and_woken(recorded):
         steps = np.full(sim.grid.geometry.blocks, sim.schedule.EMPTY)
         stepped = np.unique(one["block"][one["due"]])
         steps[stepped] = one["assigned"][stepped]
-        shortest = lowest_around(sim, steps, sim.schedule.EMPTY)[one["block"]]
+        shortest = np.minimum(steps, lowest_around(sim, steps, sim.schedule.EMPTY))[one["block"]]
         beside = (shortest < sim.schedule.EMPTY) & (one["read_at"][one["block"]] >= 0)
         present = one["now"] + one["read_at"][one["block"]]
         idle = np.setdiff1d(np.flatnonzero(beside), one["due"])

@@ -16,6 +16,7 @@ STATISTICS = {
     "runaways": 0,
 }
 PASSES = {"passes": 50, "cells_per_pass": {"min": 1, "median": 7.0, "max": 1234}, "cycles": 13, "wakes": 4321}
+PASSES |= {"clamped": 12, "extrapolations": 0}
 
 
 def simulation(stepper, particles, updates, **more):
@@ -23,6 +24,8 @@ def simulation(stepper, particles, updates, **more):
     return SimpleNamespace(
         stepper=stepper,
         scene=rts.load_scene("dam_break"),
+        schedule=SimpleNamespace(levels_double=stepper.name == "asynchronous"),
+        particles=SimpleNamespace(has_budget=False),
         base_step=0.0005,
         statistics=statistics,
         energy=lambda: Energy(1.0, 2.0, 0.5),
@@ -62,6 +65,8 @@ def test_table_shows_what_passes_cost(capsys, monkeypatch):
         "passes 50 in 13 cycles",
         "cells in a pass 1 to 1,234, median 7",
         "woken 4,321 particles",
+        "steps too long 12: use more --levels",
+        "extrapolations 0",
         "speed-up bound 3.64 over",  # 1 / (0.1 * 50 / 100 + 0.9 * 0.25)
         "energy drift -12.50%",
     ):

@@ -7,7 +7,12 @@ from exact import drop_axes
 import taichi_rts as rts
 
 SPACING = 0.1  # 316 particles
-STEPPERS = {"uniform": rts.Uniform(), "regional": rts.Regional(), "paper": rts.Regional(preset="paper")}
+STEPPERS = {
+    "uniform": rts.Uniform(),
+    "regional": rts.Regional(),
+    "paper": rts.Regional(preset="paper"),
+    "asynchronous": rts.Asynchronous(steps="integers", stagger=1),
+}
 PIECES = 8
 steppers = pytest.mark.parametrize("stepper", STEPPERS)
 
@@ -80,3 +85,32 @@ def test_the_papers_setting_steps_regions_apart(oscillating):
     assert (
         min(oscillating["paper"][1]["level_fractions"]) > 0
     )  # the default has both drops on its longest step throughout
+
+
+def test_order_of_convergence(start_taichi):
+    """Against the same particles at a step 16 times the smallest tested smaller (docs/asynchronous.md has the full tables)."""
+    scene = rts.load_scene("oscillating_drop", spacing=0.125)
+
+    def velocities(stepper):
+        sim = rts.Simulation(scene, stepper)
+        sim.advance_to(0.2)
+        return sim.velocities()
+
+    def errors(make):
+        return [np.linalg.norm(velocities(make(c)) - reference) / np.linalg.norm(reference) for c in (0.4, 0.1)]
+
+    makers = {
+        "uniform": lambda c: rts.Uniform(courant=c),
+        "regional": lambda c: rts.Regional(courant=c / 3, levels=3, alpha=c / 2, lambda_f=c / 32),
+        "asynchronous": lambda c: rts.Asynchronous(courant=c, lambda_f=c / 8, steps="integers", stagger=1),
+        "stale": lambda c: rts.Asynchronous(
+            courant=c, lambda_f=c / 8, steps="integers", stagger=1, inactive_density="stale"
+        ),
+    }
+    with start_taichi("cpu", "f64"):
+        reference = velocities(rts.Uniform(courant=0.1 / 16))
+        orders = {name: float(np.log2(np.divide(*errors(make))) / 2) for name, make in makers.items()}
+    assert orders["uniform"] > 1.7  # 2.0 measured
+    assert orders["asynchronous"] > 1.7
+    assert 0.8 < orders["regional"] < 1.7
+    assert 0.8 < orders["stale"] < 1.5

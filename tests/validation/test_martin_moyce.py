@@ -13,7 +13,7 @@ FRONTS = np.array([1.11, 1.22, 1.44, 1.67, 1.89, 2.11, 2.33, 2.56, 2.78, 3.00, 3
 @pytest.fixture(scope="module")
 def fronts(start_taichi):
     found = {}
-    for stepper in (rts.Uniform(), rts.Regional()):
+    for stepper in (rts.Uniform(), rts.Regional(), rts.Asynchronous()):
         with start_taichi("cpu", "f32"):
             sim = rts.Simulation(rts.load_scene("martin_moyce", spacing=A / 8), stepper)
             front = []
@@ -24,11 +24,14 @@ def fronts(start_taichi):
     return found
 
 
-@pytest.mark.parametrize("stepper", ["uniform", "regional"])
+@pytest.mark.parametrize("stepper", ["uniform", "regional", "asynchronous"])
 def test_front_follows_the_experiment(fronts, stepper):
     assert np.abs(fronts[stepper] / FRONTS - 1).mean() <= 0.10
 
 
-def test_regional_front_is_that_of_uniform_steps(fronts):
-    assert fronts["regional"].mean() == pytest.approx(fronts["uniform"].mean(), rel=0.03)
-    assert np.abs(fronts["regional"] / fronts["uniform"] - 1).max() < 0.03
+@pytest.mark.parametrize("stepper", ["regional", "asynchronous"])
+def test_the_front_is_that_of_uniform_steps(fronts, stepper):
+    errors = {name: np.abs(front / FRONTS - 1).mean() for name, front in fronts.items()}
+    assert abs(errors[stepper] - errors["uniform"]) < 0.02
+    assert fronts[stepper].mean() == pytest.approx(fronts["uniform"].mean(), rel=0.03)
+    assert np.abs(fronts[stepper] / fronts["uniform"] - 1).max() < 0.03

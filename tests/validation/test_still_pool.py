@@ -12,7 +12,7 @@ CALM = np.sqrt(9.81 * DEPTH)
 @pytest.fixture(scope="module")
 def pools(start_taichi):
     found = {}
-    for stepper in (rts.Uniform(), rts.Regional()):
+    for stepper in (rts.Uniform(), rts.Regional(), rts.Asynchronous()):
         with start_taichi("cpu", "f32"):
             sim = rts.Simulation(rts.load_scene("still_pool", spacing=SPACING), stepper)
             sim.advance_to(2.0)
@@ -24,12 +24,12 @@ def rms_speed(pool):
     return np.sqrt((pool[1].astype(float) ** 2).sum(axis=1).mean())
 
 
-@pytest.mark.parametrize("stepper", ["uniform", "regional"])
+@pytest.mark.parametrize("stepper", ["uniform", "regional", "asynchronous"])
 def test_it_comes_to_rest(pools, stepper):
     assert rms_speed(pools[stepper]) < 0.05 * CALM
 
 
-@pytest.mark.parametrize("stepper", ["uniform", "regional"])
+@pytest.mark.parametrize("stepper", ["uniform", "regional", "asynchronous"])
 def test_depth_stays_and_nobody_is_lost(pools, stepper):
     x, stopped = pools[stepper][0], pools[stepper][-1]
     assert len(x) == 500
@@ -40,7 +40,7 @@ def test_depth_stays_and_nobody_is_lost(pools, stepper):
     assert x[:, 1].max() + 0.5 * SPACING == pytest.approx(DEPTH, rel=0.04)
 
 
-@pytest.mark.parametrize("stepper", ["uniform", "regional"])
+@pytest.mark.parametrize("stepper", ["uniform", "regional", "asynchronous"])
 def test_pressure_carries_the_water_above(pools, stepper):
     x, p = pools[stepper][0], pools[stepper][4]
     inner = (np.abs(x[:, [0, 2]] - 0.5) < 0.3).all(axis=1) & (np.abs(x[:, 1] - 0.25) < 0.15)
@@ -48,5 +48,6 @@ def test_pressure_carries_the_water_above(pools, stepper):
     assert p[inner].mean() == pytest.approx(hydrostatic.mean(), rel=0.1)
 
 
-def test_regional_is_as_calm_as_uniform(pools):
-    assert rms_speed(pools["regional"]) <= 1.2 * rms_speed(pools["uniform"]) + 0.002 * CALM
+@pytest.mark.parametrize("stepper", ["regional", "asynchronous"])
+def test_it_is_as_calm_as_with_uniform_steps(pools, stepper):
+    assert rms_speed(pools[stepper]) <= 1.2 * rms_speed(pools["uniform"]) + 0.002 * CALM

@@ -16,7 +16,7 @@ def simulation(stepper, levels, base_step=0.0005):
     """What a painter asks a simulation for, four particles."""
     return SimpleNamespace(
         stepper=stepper,
-        schedule=SimpleNamespace(levels=levels),
+        schedule=SimpleNamespace(levels=levels, levels_double=stepper.name == "asynchronous"),
         base_step=base_step,
         count=4,
         time=0.25,
@@ -65,19 +65,19 @@ def test_classes_of_levels_keep_the_whole():
     assert [str(each) for each in classes] == ["1", "2–3", "4–7", "8–15", "16–20"]
 
 
-@pytest.mark.parametrize(("mode", "values"), [("step", [1, 2, 4, 8]), ("lead", [0, 1, 2, 9])])
-def test_steps_and_leads_are_coloured_up_to_the_longest_step(mode, values, monkeypatch):
+@pytest.mark.parametrize(("mode", "values", "top"), [("step", [1, 2, 4, 8], 8), ("lead", [0, 1, 2, 9], 16)])
+def test_steps_and_leads_are_coloured_up_to_the_longest_there_can_be(mode, values, top, monkeypatch):
     sim = simulation(rts.Asynchronous(levels=8), 8)
     assert longest_step(sim) == pytest.approx(0.004)
     painter = Painter(SCENE, PictureOptions(colour_by=mode), renderer=NOTHING)
     got = painter.colours(sim, np.zeros((4, 2)), np.full(4, 1000.0), np.array([1, 2, 4, 8]))
-    assert np.allclose(got, scalar_colours(values, 0, 8))
+    assert np.allclose(got, scalar_colours(values, 0, top))
     bars = []
     monkeypatch.setattr(legend, "draw_colour_bar", lambda image, *bar: bars.append(bar) or image)
     painter._label(np.zeros((360, 640, 3), np.uint8), sim, np.array([1, 2, 4, 8]))
     title, lower, upper, unit, _ = bars[0]
     assert title == {"step": "step", "lead": "ahead of the youngest"}[mode]
-    assert (lower, upper, unit) == (0.0, pytest.approx(4.0), "ms")
+    assert (lower, upper, unit) == (0.0, pytest.approx(0.5 * top), "ms")
 
 
 def test_short_base_steps_keep_their_digits():
