@@ -109,6 +109,8 @@ class Run:
         options = PictureOptions(
             **{f.name: getattr(self, f.name) for f in dataclasses.fields(PictureOptions) if hasattr(self, f.name)}
         )
+        if self.gui and (self.panels or self.debug):
+            raise OutputError("--gui shows one run and checks nothing; leave out --panels and --debug, or --gui")
         if self.gui:
             from taichi_rts.rendering.live import watch  # only here, because it needs Vulkan and a display
 

@@ -67,6 +67,7 @@ def projectile():
         "uniform 0.2": rts.Uniform(courant=0.2),
         "uniform 0.1": rts.Uniform(courant=0.1),
         "uniform, adaptive": rts.Uniform(adaptive=True),
+        "uniform, adaptive 0.2": rts.Uniform(courant=0.2, adaptive=True, lambda_f=0.1),
         "regional": rts.Regional(),
         "regional, limiter": rts.Regional(limiter=True),
         "regional, paper": rts.Regional(preset="paper"),
@@ -159,13 +160,14 @@ def _speed():
             begin = start if share == 1.0 else 0.0
             sim.advance_to(begin)
             before = sim.statistics
+            seen = len(getattr(sim.schedule, "seen_widths", []))
             sim.advance_to(begin + share * (end - start))
             after = sim.statistics
             updates = (after["particle_updates"] - before["particle_updates"]) / share
             walls[label] = (after["wall_seconds"] - before["wall_seconds"]) / share
             passes = after.get("passes", after["base_steps"]) - before.get("passes", before["base_steps"])
             widths = getattr(sim.schedule, "seen_widths", None)
-            width = f"{np.median(np.concatenate(widths)):.0f}" if widths else ""
+            width = f"{np.median(np.concatenate(widths[seen:])):.0f}" if widths else ""
             rows.append((label, updates, walls[label], passes, width))
         most, best = rows[0][1], walls["uniform 0.4"]
         for label, updates, wall, passes, width in rows:

@@ -95,6 +95,7 @@ def test_existing_output_is_kept(two_runs):
         (["run", "dam_break", "--panels", "figure3", "--levels", "3"], ["--panels figure3", "--levels"]),
         (["run", "dam_break", "--panels", "steppers", "--stepper", "uniform"], ["--panels steppers", "--stepper"]),
         (["run", "dam_break", "--colour-by", "age"], ["age", "lead"]),
+        (["run", "dam_break", "--gui", "--debug"], ["--gui", "--debug"]),
         (["run", "dam_break", "--arch", "tpu"], ["tpu"]),
         (["run", "dam_break", "--width", "1"], ["1 x 720"]),
         (["run", "dam_break", "--export-fps", "0"], ["export_fps"]),
