@@ -128,7 +128,7 @@ def momentum():
         row(name, *(f"{value:+.1e}" for value in drift))
 
 
-SPEED = {"double_dam_break": (0.03, 0.34, 0.42), "projectile": (0.025, 0.0, 0.03)}
+SPEED = {"double_dam_break": (0.04, 0.34, 0.40), "projectile": (0.03, 0.0, 0.02)}
 SPEED_STEPPERS = {"uniform at the smallest cell step": rts.Uniform(courant=0.05)} | STEPPERS
 
 
