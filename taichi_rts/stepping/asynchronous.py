@@ -121,8 +121,8 @@ class AsynchronousSchedule(Schedule):
     Passes come in cycles. A cycle begins at tick `now`, when no particle's last evaluation lies after it and no step ends
     before it; then the grid is sorted, by positions at that one time. Cells hold at the cycle's end until all have arrived.
     Within a cycle a cell's particles stay the same, so a particle that crosses into a cell of another time does so between two
-    cycles: it keeps its own time, and the cell steps at the time of its youngest particle; who is older is left out until
-    the cell has come to its time.
+    cycles. It keeps its state and its own time until the cell steps, at the time of its youngest particle; then all of the
+    cell move to one new time, and whose step would have lasted longer ends it there, corrected with the time that elapsed.
     """
 
     EMPTY = BlockLimiter.EMPTY
@@ -295,6 +295,14 @@ class AsynchronousSchedule(Schedule):
         """Tick at which the step of particle `i` ends."""
         return self.particles.updated[i] + self.particles.level[i]
 
+    @ti.func
+    def is_due(self, i, time):
+        """Whether particle `i` moves with its cell at `time`: whose step is not over yet ends it there, with what has elapsed.
+
+        Left out is only who was evaluated at that time or later: in a cell that was woken.
+        """
+        return self.particles.updated[i] < time or self.end(i) == time
+
     # -- before the evaluation: which cells step --------------------------------------------------------------------
 
     def select(self, now: int, tick: float) -> None:
@@ -319,7 +327,7 @@ class AsynchronousSchedule(Schedule):
                 ready = time
                 for k in range(self.grid.first(block), self.grid.first(block + 1)):
                     i = self.grid.order[k]
-                    if self.end(i) == time and self.particles.updated[i] > youngest:
+                    if self.is_due(i, time) and self.particles.updated[i] > youngest:
                         ready = self.EMPTY
             self.ready[block] = ready
 
@@ -340,7 +348,7 @@ class AsynchronousSchedule(Schedule):
             if time != self.EMPTY and time <= self.claim[block]:
                 if time <= self.beside.shortest_beside(self.claim, block):
                     for k in range(self.grid.first(block), self.grid.first(block + 1)):
-                        due += ti.cast(self.end(self.grid.order[k]) == time, ti.i32)
+                        due += ti.cast(self.is_due(self.grid.order[k], time), ti.i32)
             self.block_due[block] = due
 
     @ti.kernel
@@ -355,7 +363,7 @@ class AsynchronousSchedule(Schedule):
                 elapsed, count = 0, 0
                 for k in range(self.grid.first(block), self.grid.first(block + 1)):
                     i = self.grid.order[k]
-                    if self.end(i) == time:
+                    if self.is_due(i, time):
                         self.due[n] = k
                         n += 1
                         if time - self.particles.updated[i] != elapsed:
@@ -408,21 +416,15 @@ class AsynchronousSchedule(Schedule):
 
     @ti.kernel
     def propose_steps(self, now: ti.i32, tick: float):
-        """The longest step that the CFL condition and the force limit of a cell's particles allow, in ticks.
-
-        In a cell of mixed ages it ends when the older particles' steps end, so that from then on all move together.
-        """
+        """The longest step that the CFL condition and the force limit of a cell's particles allow, in ticks."""
         for m in range(self.occupied_count[None]):
             block = self.occupied[m]
             step = self.step[block]
             if self.block_due[block] > 0:
                 time = self.time[block]
                 speed2, acceleration2 = 0.0, 0.0
-                meeting = self.EMPTY  # when the cell's older particles end their steps, if it has some
                 for k in range(self.grid.first(block), self.grid.first(block + 1)):
                     i = self.grid.order[k]
-                    if self.particles.updated[i] < time:
-                        meeting = ti.min(meeting, self.end(i))
                     a = self.particles.a[i]
                     v = self.particles.v[i] + a * (ti.cast(time - self.particles.updated[i], float) * tick)
                     speed2, acceleration2 = ti.max(speed2, v.norm_sqr()), ti.max(acceleration2, a.norm_sqr())
@@ -434,7 +436,7 @@ class AsynchronousSchedule(Schedule):
                 if ti.static(self.stepper.limiter):
                     if step > 0:  # the first step has none to grow from
                         wanted = self.rounded(self.limiter.settled(wanted, step, time))
-                step = self.rounded(ti.min(self.aligned(wanted, time), meeting - time))
+                step = self.aligned(wanted, time)
             self.proposal[block] = step
 
     @ti.func
