@@ -1,6 +1,7 @@
 """Spatially varying time stepping for weakly compressible SPH, on Taichi. Importing starts nothing; call `init`."""
 
 from taichi_rts.backend import init
+from taichi_rts.conditions import GravityChange, Inflow, MovingWall
 from taichi_rts.diagnostics import Energy
 from taichi_rts.errors import (
     BackendError,
@@ -12,8 +13,9 @@ from taichi_rts.errors import (
     StepperError,
     TimeError,
 )
+from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
 from taichi_rts.scene import Scene, View, load_scene, scene_names
-from taichi_rts.shapes import Block, Box, LinearField, Sphere
+from taichi_rts.shapes import Block, Box, Sphere
 from taichi_rts.simulation import Simulation
 from taichi_rts.stepping.asynchronous import Asynchronous
 from taichi_rts.stepping.regional import Regional
@@ -27,7 +29,10 @@ __all__ = [
     "Box",
     "Energy",
     "Error",
+    "GravityChange",
+    "Inflow",
     "LinearField",
+    "MovingWall",
     "OutputError",
     "Regional",
     "RenderError",
@@ -36,7 +41,9 @@ __all__ = [
     "Simulation",
     "SimulationDivergedError",
     "Sphere",
+    "StandingWave",
     "StepperError",
+    "TaylorGreen",
     "TimeError",
     "Uniform",
     "View",

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import taichi as ti
 
+from taichi_rts.particles import Particles
 from taichi_rts.physics.medium import Medium
 from taichi_rts.scene import Scene
 
@@ -32,11 +33,16 @@ class Energy(NamedTuple):
 
 
 def measure_energy(
-    scene: Scene, medium: Medium, positions: np.ndarray, velocities: np.ndarray, densities: np.ndarray
+    scene: Scene,
+    medium: Medium,
+    positions: np.ndarray,
+    velocities: np.ndarray,
+    densities: np.ndarray,
+    time: float = 0.0,
 ) -> Energy:
-    """Sum kinetic, potential and internal energy [J] of particles in a fixed order, in double precision."""
+    """Sum kinetic, potential (in the gravity of `time` [s]) and internal energy [J] of particles in a fixed order, in f64."""
     x, v, rho = (np.asarray(array, dtype=np.float64) for array in (positions, velocities, densities))
-    potential = -(x @ np.asarray(scene.acceleration)) - scene.floor_potential
+    potential = -(x @ np.asarray(scene.acceleration_at(time))) - scene.floor_potential
     if scene.body_force is not None:
         potential += scene.body_force.potential(x)
     return Energy(
@@ -50,9 +56,10 @@ def measure_energy(
 class Tally:
     """Work done so far. Counts per level start at level 1."""
 
-    count: int
     levels: int
     base_steps: int = 0
+    possible: int = 0
+    """Updates if everybody had been updated in every base step."""
     wall_seconds: float = 0.0
     particle_steps: list[int] = field(default_factory=list)
     updates: list[int] = field(default_factory=list)
@@ -61,10 +68,11 @@ class Tally:
         self.particle_steps = [0] * self.levels
         self.updates = [0] * self.levels
 
-    def add(self, steps: int, particle_steps: Sequence[int], updates: Sequence[int]) -> None:
-        """Add `steps` steps with their counts per level; empty counts stand for every particle at level 1."""
+    def add(self, steps: int, count: int, particle_steps: Sequence[int], updates: Sequence[int]) -> None:
+        """Add `steps` steps of `count` particles with their counts per level; empty ones stand for everybody at level 1."""
         self.base_steps += steps
-        everybody = [steps * self.count]
+        self.possible += steps * count
+        everybody = [steps * count]
         for k, n in enumerate(particle_steps or everybody):
             self.particle_steps[k] += n
         for k, n in enumerate(updates or everybody):
@@ -73,7 +81,7 @@ class Tally:
     def statistics(self) -> dict[str, Any]:
         """Return the counts as a plain dict; fractions per level are averages over all particles and steps."""
         total = max(1, sum(self.particle_steps))
-        updates, full = sum(self.updates), max(1, self.base_steps * self.count)
+        updates, full = sum(self.updates), max(1, self.possible)
         return {
             "base_steps": self.base_steps,
             "particle_updates": updates,
@@ -111,8 +119,8 @@ class Overhead:
 
     EVERY = 61  # prime, or it would meet the same pass of every cycle
 
-    def __init__(self, count: int) -> None:
-        self.count = count
+    def __init__(self, particles: Particles) -> None:
+        self.particles = particles
         self.shared = Stopwatch()
         self.due = Stopwatch()
         self.samples = 0
@@ -138,7 +146,7 @@ class Overhead:
         if not self.updates:
             return None
         shared = self.shared.seconds / self.samples
-        return shared / (shared + self.due.seconds / self.updates * self.count)
+        return shared / (shared + self.due.seconds / self.updates * self.particles.count)
 
 
 def speedup_bound(active_fraction: float, overhead_fraction: float, passes: float = 1.0) -> float:

@@ -32,7 +32,11 @@ class Motion:
         momentum: MomentumEquation,
         integrator: Any,
         medium: Medium,
+        *,
+        integrates_density: bool = False,
     ) -> None:
+        self.integrates_density = integrates_density
+        self.moving_walls = momentum.moving
         self.particles = particles
         self.near = near
         self.grid = grid
@@ -69,7 +73,7 @@ class Motion:
                 ascent, descent = s * s * (3.0 - 2.0 * s), (1.0 - s) * (1.0 - s) * (1.0 + 2.0 * s)
                 slopes = (1.0 - s) * p.past_v[i] - s * p.v[i]
                 x = descent * p.past_x[i] + ascent * p.x[i] + (s * (1.0 - s) * h) * slopes
-        return self.geometry.clamp(x)
+        return self.geometry.place(x)
 
     @ti.func
     def share_of_past(self, i, dt, tick):
@@ -111,7 +115,7 @@ class Motion:
     @ti.kernel
     def locate_particles(self, now: ti.i32, tick: float):
         """Algorithm 1, line 4: count every particle into the cell of its present position."""
-        for i in range(self.particles.count):
+        for i in range(self.particles.alive[None]):
             self.grid.insert(i, self.position(i, self.elapsed(i, now, tick), tick))
 
     @ti.kernel
@@ -127,6 +131,22 @@ class Motion:
                     rho = self.density(i, dt, tick)
                     self.near.rho[k] = rho
                     self.near.p_over_rho2[k] = self.equation_of_state.pressure(rho) / (rho * rho)
+                    if ti.static(self.near.has_acceleration):
+                        self.near.a[k] = self.particles.a[i]
+                        self.near.elapsed[k] = dt
+                    if ti.static(self.near.has_viscosity):
+                        self.near.viscosity[k] = self.particles.viscosity[i]
+
+    @ti.kernel
+    def observe_walls(
+        self, due: ti.template(), due_count: ti.template(), read_at: ti.template(), now: ti.i32, tick: float
+    ):
+        """Note for every due particle where the moving walls are at its time."""
+        for n in range(due_count[None]):
+            k = due[n]
+            time = ti.cast(now + read_at[self.grid.block(self.grid.order[k])], float) * tick
+            for wall in ti.static(self.moving_walls):
+                wall.observe(k, time)
 
     @ti.kernel
     def advance_due(
@@ -139,13 +159,26 @@ class Motion:
             present = now + read_at[self.grid.block(i)]
             dt = self.elapsed(i, present, tick)
             a = self.particles.a[i]
+            time = ti.cast(present, float) * tick
             by_walls = self.momentum.wall_rates(k)
-            rates = self.momentum.other_rates(k) + by_walls
+            rates = self.momentum.other_rates(k, time) + by_walls
             a_new = a
             for d in ti.static(range(self.particles.dim)):
                 a_new[d] = rates[d]
             if ti.static(self.particles.has_rho_rate):
                 self.particles.rho_rate[i] = rates[self.particles.dim]
+            if ti.static(self.integrates_density):
+                diffusion = rates[self.particles.dim + 1]
+                self.particles.rho[i] += (0.5 * dt) * (diffusion - self.particles.diffusion[i])
+                self.particles.diffusion[i] = diffusion
+                self.particles.rho_rate[i] += diffusion
+            power = 0.0  # [W/kg]
+            if ti.static(self.particles.has_budget and len(self.moving_walls) > 0):
+                power = self.momentum.wall_power(k)
+            if ti.static(self.particles.has_guide):
+                if present < self.particles.guided_until[i]:
+                    power = -a_new.dot(self.particles.v[i])
+                    a_new = ti.zero(a)
             x = self.integrator.correct_position(self.near.x[k], a, a_new, dt)
             v = self.integrator.correct_velocity(self.particles.v[i], a, a_new, dt)
             v, a_new = self.limit(v, self.largest_speed), self.limit(a_new, self.largest_acceleration)
@@ -155,13 +188,19 @@ class Motion:
                 finite = finite and not (ti.math.isnan(total) or ti.math.isinf(total))
             if not finite:
                 self.not_finite[None] += 1
-            inside = self.geometry.clamp(x)
-            v_free = v
+            inside = self.geometry.place(x)
+            v_free, v_face = v, ti.zero(v)
+            for wall in ti.static(self.moving_walls):
+                held = wall.hold(inside, time)
+                if held[wall.axis] != inside[wall.axis]:
+                    _displacement, v_face[wall.axis] = wall.motion(time)
+                inside = held
             for d in ti.static(range(self.particles.dim)):
-                if inside[d] != x[d]:
-                    self.stopped[None] += 1
-                    if (x[d] - inside[d]) * v[d] > 0.0:
-                        v[d] = 0.0
+                if ti.static(not self.geometry.periodic[d]):
+                    if inside[d] != x[d]:
+                        self.stopped[None] += 1
+                        if (x[d] - inside[d]) * (v[d] - v_face[d]) > 0.0:
+                            v[d] = v_face[d]
             if ti.static(self.particles.has_budget):
                 a_walls = a
                 for d in ti.static(range(self.particles.dim)):
@@ -170,8 +209,12 @@ class Motion:
                     self.particles.past_wall_push[i] = self.particles.wall_push[i]
                 self.particles.wall_push[i] += (0.5 * dt) * (self.particles.a_walls[i] + a_walls) + v - v_free
                 self.particles.a_walls[i] = a_walls
+                self.particles.work[i] += (0.5 * dt) * (self.particles.power[i] + power)
+                self.particles.power[i] = power
             if ti.static(self.particles.has_past):
                 self.particles.past_x[i] = self.particles.x[i]
+                if ti.static(self.geometry.repeats):  # the image that lies beside the new position
+                    self.particles.past_x[i] = inside - self.geometry.difference(inside, self.particles.x[i])
                 self.particles.past_v[i] = self.particles.v[i]
                 self.particles.past_updated[i] = self.particles.updated[i]
             self.particles.x[i] = inside
@@ -191,7 +234,7 @@ class Motion:
         level: ti.types.ndarray(),
     ):
         """Write the state at `ahead` [s] after `now`, in order of particle id, into arrays outside Taichi."""
-        for i in range(self.particles.count):
+        for i in range(self.particles.alive[None]):
             dt = self.elapsed(i, now, tick) + ahead
             position = self.position(i, dt, tick)
             velocity = self.particles.v[i] + self.particles.a[i] * dt

@@ -5,6 +5,7 @@ A particle's state is anchored at its own last force evaluation: position, veloc
 tick follows in one go, and a particle nobody asks for need not be touched.
 """
 
+from collections.abc import Set
 from typing import Any
 
 import numpy as np
@@ -20,55 +21,94 @@ def vector_field(dim: int, dtype: Any, count: int) -> ti.MatrixField:
 
 @ti.data_oriented
 class Particles:
-    """Struct-of-arrays fields, (N,) each; positions x [m], velocities v [m/s], accelerations a [m/s^2], density rho.
+    """Struct-of-arrays fields, (capacity,) each; positions x [m], velocities v [m/s], accelerations a [m/s^2], density rho.
 
-    `rho_rate` d rho/dt [kg/(m^3 s)] exists only where a stepper extrapolates densities.
-    `updated` is the tick of the last force evaluation, `level` the step in base steps (0 before the first evaluation),
-    `identity` the stable particle id. The `past_` fields are the state at the evaluation before; they exist only where a
-    stepper lets some particles run ahead of others, so that readers may look back. In debug runs `wall_push` is the velocity
-    [m/s] that walls have given a particle so far, `a_walls` their share of its acceleration. Fields are re-sorted now and then
-    so that neighbours in space lie close in memory.
+    The first `alive[None]` entries hold particles; only an inflow leaves room for more. `updated` is the tick of the last
+    force evaluation, `level` the step in base steps (0 before the first evaluation), `identity` the stable particle id. Fields
+    are re-sorted now and then so that neighbours in space lie close in memory.
+
+    Some fields exist only where something needs them (`needs`, a set of these names):
+        rho_rate: d rho/dt [kg/(m^3 s)], where a density is carried through a step or integrated.
+        diffusion: the share of it that is numerical diffusion, where it is integrated.
+        past: the state at the evaluation before the last (`past_x`, `past_v`, `past_rho`, `past_updated`), where a stepper lets
+            some particles run ahead of others, so that readers may look back.
+        viscosity: nu [m^2/s], where fluids differ in it.
+        guided_until: the tick until which an inflow prescribes the velocity.
+        budget: in debug runs, `wall_push`, the velocity [m/s] that walls have given a particle so far, and `a_walls`, their
+            share of its acceleration; `work` [J/kg] that moving walls and inflows have done on it, and its `power` [W/kg].
     """
 
     def __init__(
         self,
         positions: np.ndarray,
         velocities: np.ndarray,
+        densities: np.ndarray,
         rest_density: float,
         backend: Backend,
-        *,
-        with_rho_rate: bool = False,
-        with_past: bool = False,
-        with_budget: bool = False,
+        needs: Set[str] = frozenset(),
+        capacity: int | None = None,
     ) -> None:
-        self.count, self.dim = positions.shape
-        self.x = vector_field(self.dim, backend.dtype, self.count)
-        self.v = vector_field(self.dim, backend.dtype, self.count)
-        self.a = vector_field(self.dim, backend.dtype, self.count)
-        self.rho = ti.field(backend.dtype, self.count)
-        self.has_rho_rate = with_rho_rate
-        self.rho_rate: Any = ti.field(backend.dtype, self.count) if with_rho_rate else None
-        self.updated = ti.field(ti.i32, self.count)
-        self.level = ti.field(ti.i32, self.count)
-        self.identity = ti.field(ti.i32, self.count)
-        self.has_past = with_past
-        if with_past:
-            self.past_x = vector_field(self.dim, backend.dtype, self.count)
-            self.past_v = vector_field(self.dim, backend.dtype, self.count)
-            self.past_rho = ti.field(backend.dtype, self.count)
-            self.past_updated = ti.field(ti.i32, self.count)
-        self.has_budget = with_budget
-        if with_budget:
-            self.a_walls = vector_field(self.dim, backend.dtype, self.count)
-            self.wall_push = vector_field(self.dim, backend.dtype, self.count)
-            if with_past:
-                self.past_wall_push = vector_field(self.dim, backend.dtype, self.count)
-        self.real_scratch = ti.field(backend.dtype, self.count)
-        self.integer_scratch = ti.field(ti.i32, self.count)
-        self.x.from_numpy(positions.astype(backend.numpy_dtype))
-        self.v.from_numpy(velocities.astype(backend.numpy_dtype))
-        self.rho.fill(rest_density)
-        self.identity.from_numpy(np.arange(self.count, dtype=np.int32))
+        count, self.dim = positions.shape
+        self.capacity = count if capacity is None else capacity
+        self.alive = ti.field(ti.i32, ())
+        self.alive[None] = self.count = count
+        self.has_rho_rate = "rho_rate" in needs
+        self.has_diffusion = "diffusion" in needs
+        self.has_past = "past" in needs
+        self.has_viscosity = "viscosity" in needs
+        self.has_guide = "guided_until" in needs
+        self.has_budget = "budget" in needs
+        self.reals: list[ti.Field] = []
+        self.integers: list[ti.Field] = []
+
+        def vector() -> ti.MatrixField:
+            field = vector_field(self.dim, backend.dtype, self.capacity)
+            self.reals += [field.get_scalar_field(d) for d in range(self.dim)]
+            return field
+
+        def scalar() -> ti.Field:
+            self.reals.append(ti.field(backend.dtype, self.capacity))
+            return self.reals[-1]
+
+        def integer() -> ti.Field:
+            self.integers.append(ti.field(ti.i32, self.capacity))
+            return self.integers[-1]
+
+        self.x, self.v, self.a, self.rho = vector(), vector(), vector(), scalar()
+        self.updated, self.level, self.identity = integer(), integer(), integer()
+        if self.has_rho_rate:
+            self.rho_rate = scalar()
+        if self.has_diffusion:
+            self.diffusion = scalar()
+        if self.has_past:
+            self.past_x, self.past_v, self.past_rho, self.past_updated = vector(), vector(), scalar(), integer()
+        if self.has_viscosity:
+            self.viscosity = scalar()
+        if self.has_guide:
+            self.guided_until = integer()
+        if self.has_budget:
+            self.a_walls, self.wall_push, self.work, self.power = vector(), vector(), scalar(), scalar()
+            if self.has_past:
+                self.past_wall_push = vector()
+        self.real_scratch = ti.field(backend.dtype, self.capacity)
+        self.integer_scratch = ti.field(ti.i32, self.capacity)
+        unborn = ((0, self.capacity - count), (0, 0))
+        self.x.from_numpy(np.pad(positions, unborn).astype(backend.numpy_dtype))
+        self.v.from_numpy(np.pad(velocities, unborn).astype(backend.numpy_dtype))
+        self.rho.from_numpy(np.pad(densities, unborn[0], constant_values=rest_density).astype(backend.numpy_dtype))
+        self.identity.from_numpy(np.arange(self.capacity, dtype=np.int32))
+
+    def to_numpy(self, field: ti.Field) -> np.ndarray:
+        """Values of one of the fields in order of particle id, (N,) or (N, dim)."""
+        values = field.to_numpy()[: self.count]
+        ordered = np.empty_like(values)
+        ordered[self.identity.to_numpy()[: self.count]] = values
+        return ordered
+
+    def grow(self, count: int) -> None:
+        """Make room for `count` more at the end, whose ids follow."""
+        self.count += count
+        self.alive[None] = self.count
 
     def reorder(self, order: ti.Field) -> None:
         """Move entry `order[k]` of every field to place k, then make `order` the identity."""
@@ -76,44 +116,43 @@ class Particles:
 
     @ti.kernel
     def reorder_fields(self, order: ti.template()):
-        for field in ti.static(self._real_fields()):
-            for k in range(self.count):
+        for field in ti.static(self.reals):
+            for k in range(self.alive[None]):
                 self.real_scratch[k] = field[order[k]]
-            for k in range(self.count):
+            for k in range(self.alive[None]):
                 field[k] = self.real_scratch[k]
-        for field in ti.static(self._integer_fields()):
-            for k in range(self.count):
+        for field in ti.static(self.integers):
+            for k in range(self.alive[None]):
                 self.integer_scratch[k] = field[order[k]]
-            for k in range(self.count):
+            for k in range(self.alive[None]):
                 field[k] = self.integer_scratch[k]
-        for k in range(self.count):
+        for k in range(self.alive[None]):
             order[k] = k
-
-    def _real_fields(self) -> list[ti.Field]:
-        vectors = [self.x, self.v, self.a] + ([self.past_x, self.past_v] if self.has_past else [])
-        vectors += [self.a_walls, self.wall_push] if self.has_budget else []
-        vectors += [self.past_wall_push] if self.has_budget and self.has_past else []
-        scalars = (
-            [self.rho] + ([self.past_rho] if self.has_past else []) + ([self.rho_rate] if self.has_rho_rate else [])
-        )
-        return [field.get_scalar_field(d) for field in vectors for d in range(self.dim)] + scalars
-
-    def _integer_fields(self) -> list[ti.Field]:
-        return [self.updated, self.level, self.identity] + ([self.past_updated] if self.has_past else [])
 
 
 @ti.data_oriented
 class Neighbourhood:
     """What pair loops read, in the grid's order: predicted position x and velocity v, density rho, p/rho^2 [m^5/(kg s^2)].
 
+    With `needs` "acceleration" also a [m/s^2] of the step that leads here and the time
+    `elapsed` [s] in it, and with "viscosity" nu [m^2/s].
+
     Only entries near a due particle are filled in a step. `padding` entries behind the last may be read by loops of
     constant length; they count for nothing.
     """
 
-    def __init__(self, count: int, dim: int, backend: Backend) -> None:
+    def __init__(self, count: int, dim: int, backend: Backend, needs: Set[str] = frozenset()) -> None:
+        self.count = count
         padded = count + backend.lanes
         self.x = vector_field(dim, backend.dtype, padded)
         self.v = vector_field(dim, backend.dtype, padded)
         self.rho = ti.field(backend.dtype, padded)
         self.p_over_rho2 = ti.field(backend.dtype, padded)
+        self.has_acceleration = "acceleration" in needs
+        self.has_viscosity = "viscosity" in needs
+        if self.has_acceleration:
+            self.a = vector_field(dim, backend.dtype, padded)
+            self.elapsed = ti.field(backend.dtype, padded)
+        if self.has_viscosity:
+            self.viscosity = ti.field(backend.dtype, padded)
         self.rho.fill(1.0)

@@ -78,7 +78,7 @@ def print_table(sim: Simulation, initial_energy: Energy) -> None:
         facts.add_row("speed-up bound", f"{bound:.2f} over uniform steps of the base step")
     for name, fact in pass_facts(statistics):
         facts.add_row(name, fact)
-    if sim.particles.has_budget and sim.scene.body_force is None:
+    if sim.keeps_momentum_budget:
         share = np.linalg.norm(sim.momentum_drift()) / (
             sim.medium.mass * sim.count * max(sim.scene.estimate_max_speed(), 1e-9)
         )

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from taichi_rts.conditions import AXES, Inflow
+from taichi_rts.physics.equation_of_state import Tait
 from taichi_rts.scene import Scene
 from taichi_rts.shapes import Block, Sphere, velocities
 from taichi_rts.smoothing import lattice_sum, make_kernel
 
+CONTINUED_LATTICE = 1.0
 WALL_STIFFNESS = 4.0 / 3.0
 """How much steeper a wall's density profile is than the lattice's it replaces (see `calibrate_walls`).
 
@@ -19,31 +22,84 @@ WALL_STIFFNESS = 4.0 / 3.0
 double dam break. 2 balances a particle at rest on the wall exactly, but is so stiff that the same dam break throws particles
 at 47 m/s at courant 0.4 and blows up at 0.6. 4/3 settles 1.2 % too low, keeps every centre off the faces, and survives both
 (docs/defaults.md).
+With an integrated density the walls' pressure is mirrored and 1 is right (`continuity.MirroredPressure`).
 """
 
 
 @dataclass(frozen=True)
-class Sample:
-    """Particles at the start: fluid positions [m] and velocities [m/s], (N, dim), one mass [kg], and the walls.
+class WallLayer:
+    """Wall particles behind faces of the domain: positions [m] and normals into the fluid, (M, dim), volumes [m^dim], (M,).
 
-    Wall particles have positions [m], (M, dim), and volumes [m^dim], (M,).
+    They lie `depth` [m] behind their face; `stiffness` is that of `calibrate_walls`.
+    """
+
+    positions: np.ndarray
+    normals: np.ndarray
+    volumes: np.ndarray
+    depth: float
+    stiffness: float
+
+    def choose(self, mask: np.ndarray) -> WallLayer:
+        """Return those that `mask`, (M,), names."""
+        return replace(self, positions=self.positions[mask], normals=self.normals[mask], volumes=self.volumes[mask])
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Particles at the start: positions [m] and velocities [m/s], (N, dim), densities [kg/m^3], viscosities [m^2/s], (N,).
+
+    All have one mass [kg]. `walls` are the wall particles, (M,), and `owners`, (M,), the number of the moving wall that each
+    is part of, -1 for those at rest.
     """
 
     positions: np.ndarray
     velocities: np.ndarray
+    densities: np.ndarray
+    viscosities: np.ndarray
     mass: float
-    wall_positions: np.ndarray
-    wall_volumes: np.ndarray
+    walls: WallLayer
+    owners: np.ndarray
 
 
 def sample(scene: Scene) -> Sample:
     """Fill the scene's fluids with a lattice and line its walls."""
     positions = [fill(scene, fluid) for fluid in scene.fluids]
     moving = [velocities(fluid, x) for fluid, x in zip(scene.fluids, positions, strict=True)]
-    wall_positions, wall_volumes = line_walls(scene)
+    pressed = [compress(scene, fluid, x) for fluid, x in zip(scene.fluids, positions, strict=True)]
+    viscosities = [np.full(len(x), nu) for x, nu in zip(positions, scene.viscosities, strict=False)]
     return Sample(
-        np.concatenate(positions), np.concatenate(moving), calibrate_mass(scene), wall_positions, wall_volumes
+        np.concatenate([x for x, _ in pressed]),
+        np.concatenate(moving),
+        np.concatenate([rho for _, rho in pressed]),
+        np.concatenate(viscosities),
+        calibrate_mass(scene),
+        *line_walls(scene),
     )
+
+
+def compress(scene: Scene, fluid: Block | Sphere, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions `x` [m], (N, dim), and densities [kg/m^3], (N,), under the hydrostatic pressure of the fluid's own column.
+
+    p = rho_0 g (H - z), and every layer sinks by what those below it give way: g (H z - z^2/2)/c_s^2 at height z over the
+    fluid's lowest point. Without `Scene.hydrostatic` all stays as it is.
+    """
+    rest = np.full(len(x), scene.rest_density)
+    g = math.hypot(*scene.acceleration)
+    if not scene.hydrostatic or g == 0.0:
+        return x, rest
+    up = -np.asarray(scene.acceleration) / g
+    height = fluid.reach(tuple(up)) + fluid.reach(tuple(-up))
+    z = x @ up + fluid.reach(tuple(-up))
+    state = Tait(scene.rest_density, scene.wave_speed)
+    sinking = g / scene.wave_speed**2 * (height * z - 0.5 * z * z)
+    return x - sinking[:, None] * up, state.density(scene.rest_density * g * (height - z))
+
+
+def fill_patch(scene: Scene, inflow: Inflow) -> np.ndarray:
+    """Positions [m], (N, dim), of the layer of particles that an inflow lets in at once, on its patch."""
+    half = 0.5 * scene.spacing * np.eye(scene.dim)[inflow.axis]
+    lower, upper = np.asarray(inflow.lower) - half, np.asarray(inflow.upper) + half
+    return fill_block(scene, Block(tuple(lower), tuple(upper)))
 
 
 def calibrate_mass(scene: Scene) -> float:
@@ -88,13 +144,17 @@ def fill_sphere(scene: Scene, sphere: Sphere) -> np.ndarray:
     return np.asarray(sphere.centre) + offsets[inside]
 
 
-def line_walls(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Positions [m], (M, dim), and volumes [m^dim], (M,), of one layer of wall particles behind each face of the domain.
+def line_walls(scene: Scene) -> tuple[WallLayer, np.ndarray]:
+    """One layer of wall particles behind each face of the domain, and (M,), which moving wall each is part of, -1 if of none.
 
-    Depth and volume come from `calibrate_walls`; along a face the spacing is adapted so that a whole number fits.
+    Depth and volume come from `calibrate_walls`; along a face the
+    spacing is adapted so that a whole number fits. There are no
+    faces across periodic axes, and no wall behind an inflow.
     """
-    if not scene.walls:
-        return np.zeros((0, scene.dim)), np.zeros(0)
+    if not scene.walls or all(scene.is_periodic):
+        nothing = np.zeros((0, scene.dim))
+        return WallLayer(nothing, nothing, np.zeros(0), 0.0, 1.0), np.zeros(0, int)
+    numbers: dict[str, int] = {wall.face: number for number, wall in enumerate(scene.moving_walls)}
     s = scene.spacing
     depth, volume = calibrate_walls(scene)
     inner, stretch = [], []
@@ -103,17 +163,37 @@ def line_walls(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
         width = (high - low) / count
         inner.append(low + (np.arange(count) + 0.5) * width)
         stretch.append(width / s)
-    positions, volumes = [], []
+    positions, normals, volumes, owners = [], [], [], []
     for axis in range(scene.dim):  # the two faces across `axis`; earlier axes' faces own the edges they share
+        if scene.is_periodic[axis]:
+            continue
         faces = np.array([scene.domain.lower[axis] - depth, scene.domain.upper[axis] + depth])
         beyond = [
-            np.concatenate([[scene.domain.lower[d] - depth], inner[d], [scene.domain.upper[d] + depth]])
+            inner[d]
+            if scene.is_periodic[d]
+            else np.concatenate([[scene.domain.lower[d] - depth], inner[d], [scene.domain.upper[d] + depth]])
             for d in range(axis + 1, scene.dim)
         ]
         positions.append(_product([*inner[:axis], faces, *beyond]))
         share = math.prod(stretch[d] for d in range(scene.dim) if d != axis)
         volumes.append(np.full(len(positions[-1]), volume * share))
-    return np.concatenate(positions), np.concatenate(volumes)
+        behind = positions[-1][:, axis] == faces[0]
+        normals.append(np.where(behind, 1.0, -1.0)[:, None] * np.eye(scene.dim)[axis])
+        owners.append(np.where(behind, numbers.get(AXES[axis] + "-", -1), numbers.get(AXES[axis] + "+", -1)))
+    layer = WallLayer(
+        np.concatenate(positions), np.concatenate(normals), np.concatenate(volumes), depth, wall_stiffness(scene)
+    )
+    behind_patches = np.zeros(len(layer.positions), bool)
+    for inflow in scene.inflows:
+        reach = np.where(np.arange(scene.dim) == inflow.axis, 1.5 * depth, 0.5 * s)
+        first, last = np.asarray(inflow.lower) - reach, np.asarray(inflow.upper) + reach
+        behind_patches |= ((layer.positions >= first) & (layer.positions <= last)).all(axis=1)
+    return layer.choose(~behind_patches), np.concatenate(owners)[~behind_patches]
+
+
+def wall_stiffness(scene: Scene) -> float:
+    """How much steeper the walls' density profile is than the lattice's, for the scene's formulation of density."""
+    return CONTINUED_LATTICE if scene.density == "continuity" else WALL_STIFFNESS
 
 
 def calibrate_walls(scene: Scene) -> tuple[float, float]:
@@ -121,8 +201,8 @@ def calibrate_walls(scene: Scene) -> tuple[float, float]:
 
     Its nearest layer, half a spacing from the face, must have its rest density, so the wall replaces what the missing half
     of the lattice would add: V S(d) = D m/rho_0. S(d) is the sum of W over the wall's plane at distance d, D the sum over the
-    missing layers. And the wall should carry it: it pushes with p_i alone where the missing half would push with p_i and
-    p_j, so its slope has to be steeper: S'(d)/S(d) = WALL_STIFFNESS D'/D. The two give d, then V.
+    missing layers. And the wall should carry it: where it pushes with p_i alone and the missing half would push with p_i and
+    p_j, its slope has to be steeper: S'(d)/S(d) = WALL_STIFFNESS D'/D. The two give d, then V.
     """
     s, dim, r = scene.spacing, scene.dim, scene.support
     kernel = make_kernel(scene.kernel, dim, r)
@@ -139,7 +219,7 @@ def calibrate_walls(scene: Scene) -> tuple[float, float]:
     def missing(d: float) -> float:
         return sum(plane(d + k * s) for k in range(reach))
 
-    wanted = WALL_STIFFNESS * slope(missing, s) / missing(s)
+    wanted = wall_stiffness(scene) * slope(missing, s) / missing(s)
     near, far = s, 0.95 * r
     for _ in range(60):
         middle = 0.5 * (near + far)

@@ -16,8 +16,11 @@ from annotated_types import Len
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from taichi_rts.conditions import AXES, Axis, GravityChange, Inflow, MovingWall
 from taichi_rts.errors import SceneError
-from taichi_rts.shapes import Block, Box, Fluid, LinearField, Sphere, separation, top_speed
+from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
+from taichi_rts.scene_checks import contradictions
+from taichi_rts.shapes import Block, Box, Fluid, Sphere, top_speed
 from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, describe, validated
 
 if sys.version_info >= (3, 11):
@@ -43,22 +46,28 @@ class View:
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class Scene:
-    """A closed box of walls, the blocks and spheres of fluid in it, and the constants of the fluid.
+    """A closed box of walls, the blocks and spheres of fluid in it, what drives them, and the constants of the fluid.
 
     Attributes:
         domain: the box that no particle's centre leaves.
         fluids: blocks and spheres of fluid; they may touch but not overlap, two spheres stay half a spacing apart.
         spacing: initial particle spacing s [m].
         gravity: acceleration [m/s^2], (dim,); None: 9.81 m/s^2 along -y.
+        gravity_changes: from each one's time on gravity is another.
         body_force: acceleration [m/s^2] added to gravity, linear in space; its gradient must be symmetric.
         sound_speed: c_s [m/s]; None: ten times an estimate of the largest speed (see `estimate_max_speed`).
-        density: how density is computed; "summation" is the only formulation.
+        density: "summation" (over the neighbours) or "continuity" (integrated in time, with delta-SPH diffusion).
+        background_pressure: [Pa] added to the equation of state; keeps fluid without a free surface from tearing.
         kernel: "cubic_spline" or "wendland_c2".
         support_ratio: support radius r over spacing s.
         rest_density: rho_0 [kg/m^3] (per metre of depth in two dimensions).
         artificial_viscosity: alpha of Monaghan's artificial viscosity; 0 compiles it out.
         kinematic_viscosity: nu [m^2/s] of the laminar viscosity; 0 compiles it out.
+        hydrostatic: whether the fluids start compressed by their own weight, instead of falling into it and ringing.
         walls: whether the domain's faces carry wall particles; without, they only stop centres.
+        periodic: axes ("x", "y", "z") along which the domain repeats itself; they have no walls.
+        moving_walls: faces of the domain that move.
+        inflows: patches of the domain's faces through which fluid enters.
         end_time: how long the scene is worth watching [s].
         view: where pictures are taken from.
 
@@ -69,15 +78,21 @@ class Scene:
     fluids: Annotated[tuple[Fluid, ...], Len(1)]
     spacing: Positive
     gravity: Vector | None = None
+    gravity_changes: tuple[GravityChange, ...] = ()
     body_force: LinearField | None = None
     sound_speed: Positive | None = None
-    density: Literal["summation"] = "summation"
+    density: Literal["summation", "continuity"] = "summation"
+    background_pressure: NotNegative = 0.0
     kernel: Literal["cubic_spline", "wendland_c2"] = "cubic_spline"
     support_ratio: Annotated[float, Field(ge=1.5, le=4.0)] = 2.0
     rest_density: Positive = 1000.0
     artificial_viscosity: NotNegative = 0.08
     kinematic_viscosity: NotNegative = 0.0
+    hydrostatic: bool = False
     walls: bool = True
+    periodic: tuple[Axis, ...] = ()
+    moving_walls: tuple[MovingWall, ...] = ()
+    inflows: tuple[Inflow, ...] = ()
     end_time: Positive = 1.0
     view: View = Field(default_factory=View)
     name: str = "scene"
@@ -85,7 +100,7 @@ class Scene:
 
     @model_validator(mode="after")
     def _check(self) -> Scene:
-        faults = _contradictions(self)
+        faults = contradictions(self)
         if faults:
             raise ValueError("\n  ".join(faults))
         return self
@@ -102,8 +117,24 @@ class Scene:
 
     @property
     def acceleration(self) -> tuple[float, ...]:
-        """Gravity [m/s^2], (dim,), with the default filled in."""
+        """Gravity [m/s^2], (dim,), at the start, with the default filled in."""
         return self.gravity if self.gravity is not None else (0.0, -9.81, 0.0)[: self.dim]
+
+    def acceleration_at(self, time: float) -> tuple[float, ...]:
+        """Gravity [m/s^2], (dim,), at `time` [s]."""
+        return next((c.gravity for c in reversed(self.gravity_changes) if c.time <= time), self.acceleration)
+
+    @property
+    def is_periodic(self) -> tuple[bool, ...]:
+        """For each axis whether the domain repeats itself along it, (dim,)."""
+        return tuple(axis in self.periodic for axis in AXES[: self.dim])
+
+    @property
+    def viscosities(self) -> tuple[float, ...]:
+        """Kinematic viscosity [m^2/s] of each fluid, (len(fluids),), and of what flows in, if anything does."""
+        own = (fluid.kinematic_viscosity for fluid in self.fluids)
+        inflow = (self.kinematic_viscosity,) * bool(self.inflows)
+        return (*(self.kinematic_viscosity if nu is None else nu for nu in own), *inflow)
 
     @property
     def wave_speed(self) -> float:
@@ -114,17 +145,24 @@ class Scene:
         """Largest speed [m/s] any fluid can reach by falling from where it is: max of sqrt(|v|^2 + 2 g H).
 
         H [m] is the height of a fluid's top above the lowest corner of the domain, along gravity, |v| the largest speed in
-        its bounding box. A body force is left out.
+        its bounding box, or of an inflow, or of a moving wall. After a change of gravity fluid may fall through all of the
+        domain; along a periodic axis it falls once around. A body force is left out.
         """
+        walls = [abs(v) for wall in self.moving_walls for v in wall.velocities]
         uphill = tuple(-a for a in self.acceleration)
-        falls = (max(fluid.reach(uphill) - self.floor_potential, 0.0) for fluid in self.fluids)
-        return max(
-            math.sqrt(top_speed(fluid) ** 2 + 2.0 * fall) for fluid, fall in zip(self.fluids, falls, strict=True)
-        )
+        starts = [(top_speed(fluid), fluid.reach(uphill)) for fluid in self.fluids]
+        starts += [(math.hypot(*inflow.velocity), inflow.reach(uphill)) for inflow in self.inflows]
+        falls = [(speed, max(height - self.floor_potential, 0.0)) for speed, height in starts]
+        top = max(speed for speed, _ in falls)
+        for change in self.gravity_changes:
+            falls.append(
+                (top, sum(abs(g) * length for g, length in zip(change.gravity, self.domain.size, strict=False)))
+            )
+        return max(*walls, *(math.sqrt(speed**2 + 2.0 * fall) for speed, fall in falls), 0.0)
 
     @property
     def floor_potential(self) -> float:
-        """Smallest value of -g.x over the domain [m^2/s^2]: where the potential energy is zero."""
+        """Smallest value of -g.x over the domain [m^2/s^2], with the gravity of the start: there the potential energy is 0."""
         return -self.domain.reach(self.acceleration)
 
     def replace(self, **changes: Any) -> Scene:
@@ -137,7 +175,7 @@ class Scene:
         return pydantic.TypeAdapter(Scene).dump_python(self, mode="json", exclude_none=True)
 
 
-_PARTS = (Scene, Box, Block, Sphere, LinearField, View)
+_PARTS = (Scene, Box, Block, Sphere, LinearField, TaylorGreen, StandingWave, GravityChange, MovingWall, Inflow, View)
 _KEYS = [key for cls in _PARTS for key in cls.__dataclass_fields__]  # type: ignore[attr-defined]
 
 
@@ -196,83 +234,8 @@ def parse_count(value: float | str) -> int:
 
 def _spacing_for(scene: Scene, count: int) -> float:
     volume = sum(fluid.volume for fluid in scene.fluids)
-    return (volume / count) ** (1.0 / scene.dim)
-
-
-def _contradictions(scene: Scene) -> list[str]:
-    """Find what is wrong between fields that are each valid."""
-    faults = []
-    dim = scene.dim
-    if scene.gravity is not None and len(scene.gravity) != dim:
-        faults.append(f"gravity {scene.gravity} has {len(scene.gravity)} components; the domain has {dim}")
-    faults += _body_force_faults(scene)
-    for k, fluid in enumerate(scene.fluids):
-        if len(fluid.lower) != dim:
-            faults.append(f"fluids.{k}: has {len(fluid.lower)} components; the domain has {dim}")
-            continue
-        faults += _fluid_faults(scene, k, fluid)
-        for other in range(k):
-            if len(scene.fluids[other].lower) == dim:
-                faults += _pair_faults(scene, k, other)
-    if not faults and scene.sound_speed is None and scene.estimate_max_speed() <= 0.0:
-        faults.append("sound_speed: nothing falls or moves at the start, so no default follows; give it a value [m/s]")
-    return faults
-
-
-def _body_force_faults(scene: Scene) -> list[str]:
-    force = scene.body_force
-    if force is None:
-        return []
-    faults = []
-    if force.dim != scene.dim:
-        faults.append(f"body_force: has {force.dim} components; the domain has {scene.dim}")
-    if not force.is_conservative:
-        faults.append(
-            f"body_force: gradient {force.gradient} is not symmetric, so it has no potential energy; "
-            "make gradient[d][e] equal gradient[e][d]"
-        )
-    if scene.sound_speed is None:
-        faults.append(
-            "sound_speed: how fast the body_force makes the fluid is not known, so no default follows; "
-            "give ten times the largest speed you expect [m/s]"
-        )
-    return faults
-
-
-def _fluid_faults(scene: Scene, k: int, fluid: Block | Sphere) -> list[str]:
-    faults = []
-    slack = _slack(scene)
-    low = all(a >= b - slack for a, b in zip(fluid.lower, scene.domain.lower, strict=True))
-    high = all(a <= b + slack for a, b in zip(fluid.upper, scene.domain.upper, strict=True))
-    if not (low and high):
-        faults.append(
-            f"fluids.{k}: {fluid.outline} leaves the domain from "
-            f"{scene.domain.lower} to {scene.domain.upper}; move or shrink it, or enlarge the domain"
-        )
-    if isinstance(fluid, Sphere):
-        name, least = "radius", fluid.radius
-    else:
-        name, least = "shortest edge", min(b - a for a, b in zip(fluid.lower, fluid.upper, strict=True))
-    if least < scene.spacing * (1 - 1e-6):
-        faults.append(f"spacing: {scene.spacing} exceeds the {name} {least:g} of fluids.{k}; use at most {least:g}")
-    return faults
-
-
-def _pair_faults(scene: Scene, k: int, other: int) -> list[str]:
-    one, two = scene.fluids[k], scene.fluids[other]
-    gap = separation(one, two)
-    slack = _slack(scene)
-    if gap < -slack:
-        return [f"fluids.{k}: overlaps fluids.{other}; move one of them"]
-    # A sphere's particles may lie on its surface, a block's stay half a spacing inside: only two spheres' can coincide.
-    both_round = isinstance(one, Sphere) and isinstance(two, Sphere)
-    if both_round and gap < 0.5 * scene.spacing - slack:
-        return [
-            f"fluids.{k}: lies {max(gap, 0.0):g} from fluids.{other}, nearer than half a spacing {0.5 * scene.spacing:g}, "
-            "so that particles could coincide; move one of them or use a smaller spacing"
-        ]
-    return []
-
-
-def _slack(scene: Scene) -> float:
-    return 1e-9 * max(scene.domain.size)  # for lengths [m] that rounding blurs
+    spacing = float((volume / count) ** (1.0 / scene.dim))
+    for length, periodic in zip(scene.domain.size, scene.is_periodic, strict=True):
+        if periodic:  # which has to be a whole number of spacings
+            return length / round(length / spacing)
+    return spacing

@@ -1,4 +1,4 @@
-"""Where fluid is at the start and how it moves there: boxes, blocks, spheres, and fields that are linear in space."""
+"""Where fluid is at the start and how it moves there: boxes, blocks and spheres."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import math
 from typing import Annotated, Any
 
 import numpy as np
-from annotated_types import Len
 from pydantic import Discriminator, Tag, model_validator
 from pydantic.dataclasses import dataclass
 
 from taichi_rts.errors import SceneError
-from taichi_rts.validation import FROZEN, Positive, Vector, validated
+from taichi_rts.fields import Field, Velocity
+from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, validated
 
 
 @validated(SceneError)
@@ -34,74 +34,7 @@ class Box:
 
     def reach(self, direction: Vector) -> float:
         """Largest value of direction.x over the box; `direction` is (dim,)."""
-        return sum(max(d * a, d * b) for d, a, b in zip(direction, self.lower, self.upper, strict=True))
-
-
-@validated(SceneError)
-@dataclass(frozen=True, config=FROZEN)
-class LinearField:
-    """The vector field value + gradient . (x - origin).
-
-    Attributes:
-        gradient: derivative of component d along e in row d and column e [1/s for a velocity, 1/s^2 for an acceleration].
-        value: the field at `origin`, (dim,); None: 0.
-        origin: [m], (dim,); None: 0.
-    """
-
-    gradient: Annotated[tuple[Vector, ...], Len(2, 3)]
-    value: Vector | None = None
-    origin: Vector | None = None
-
-    @model_validator(mode="after")
-    def _check(self) -> LinearField:
-        faults = [
-            f"gradient: row {k} has {len(row)} components; {self.dim} rows need {self.dim}"
-            for k, row in enumerate(self.gradient)
-            if len(row) != self.dim
-        ]
-        for name, vector in (("value", self.value), ("origin", self.origin)):
-            if vector is not None and len(vector) != self.dim:
-                faults.append(f"{name} {vector} has {len(vector)} components; the gradient has {self.dim}")
-        if faults:
-            raise ValueError("\n  ".join(faults))
-        return self
-
-    @property
-    def dim(self) -> int:
-        """Number of space dimensions, 2 or 3."""
-        return len(self.gradient)
-
-    @property
-    def base(self) -> tuple[Vector, Vector]:
-        """`origin` and `value`, (dim,) each, with the defaults filled in."""
-        zero = (0.0,) * self.dim
-        return self.origin or zero, self.value or zero
-
-    @property
-    def is_conservative(self) -> bool:
-        """Whether the field has a potential: its gradient is symmetric."""
-        gradient = np.array(self.gradient)
-        return bool(np.abs(gradient - gradient.T).max() <= 1e-9 * np.abs(gradient).max())
-
-    def at(self, x: np.ndarray) -> np.ndarray:
-        """Values (..., dim) at positions `x` [m], (..., dim)."""
-        origin, value = self.base
-        return np.asarray(value) + (np.asarray(x) - origin) @ np.array(self.gradient).T
-
-    def potential(self, x: np.ndarray) -> np.ndarray:
-        """-(value.y + y.gradient.y / 2), (...), at positions `x` [m], (..., dim), y = x - origin: the field is -grad of it."""
-        origin, value = self.base
-        y = np.asarray(x) - origin
-        return -(y @ np.asarray(value) + 0.5 * (y @ np.array(self.gradient) * y).sum(axis=-1))
-
-
-def _velocity_tag(data: Any) -> str:
-    return "<field>" if isinstance(data, dict | LinearField) else "<vector>"
-
-
-Velocity = Annotated[
-    Annotated[Vector, Tag("<vector>")] | Annotated[LinearField, Tag("<field>")], Discriminator(_velocity_tag)
-]
+        return box_reach(self.lower, self.upper, direction)
 
 
 @validated(SceneError)
@@ -109,12 +42,14 @@ Velocity = Annotated[
 class Block:
     """A block of fluid between two corners `lower` and `upper` [m], (dim,).
 
-    It moves at `velocity` [m/s]: a vector (dim,) or a `LinearField`; None: at rest.
+    It moves at `velocity` [m/s]: a vector (dim,) or a field of `taichi_rts.fields`; None: at rest. `kinematic_viscosity` is
+    its nu [m^2/s]; None: the scene's.
     """
 
     lower: Vector
     upper: Vector
     velocity: Velocity | None = None
+    kinematic_viscosity: NotNegative | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Block:
@@ -134,7 +69,7 @@ class Block:
 
     def reach(self, direction: Vector) -> float:
         """Largest value of direction.x over the block; `direction` is (dim,)."""
-        return Box(self.lower, self.upper).reach(direction)
+        return box_reach(self.lower, self.upper, direction)
 
 
 @validated(SceneError)
@@ -142,12 +77,14 @@ class Block:
 class Sphere:
     """A sphere of fluid, in two dimensions a disc, around `centre` [m], (dim,), with `radius` [m].
 
-    It moves at `velocity` [m/s]: a vector (dim,) or a `LinearField`; None: at rest.
+    It moves at `velocity` [m/s]: a vector (dim,) or a field of `taichi_rts.fields`; None: at rest. `kinematic_viscosity` is
+    its nu [m^2/s]; None: the scene's.
     """
 
     centre: Vector
     radius: Positive
     velocity: Velocity | None = None
+    kinematic_viscosity: NotNegative | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Sphere:
@@ -190,14 +127,21 @@ Fluid = Annotated[Annotated[Block, Tag("<block>")] | Annotated[Sphere, Tag("<sph
 
 def velocities(fluid: Block | Sphere, x: np.ndarray) -> np.ndarray:
     """Velocities [m/s], (N, dim), of a fluid's particles at `x` [m], (N, dim)."""
-    if isinstance(fluid.velocity, LinearField):
+    if isinstance(fluid.velocity, Field):
         return fluid.velocity.at(x)
     return np.tile(np.asarray(fluid.velocity or (0.0,) * x.shape[1]), (len(x), 1))
 
 
 def top_speed(fluid: Block | Sphere) -> float:
-    """Largest speed [m/s] in a fluid's bounding box: of a linear field it is convex, so it is that of a corner."""
-    return float(np.linalg.norm(velocities(fluid, np.array(corners(fluid))), axis=1).max())
+    """Largest speed [m/s] in a fluid's bounding box."""
+    if isinstance(fluid.velocity, Field):
+        return fluid.velocity.top_speed(np.array(corners(fluid)))
+    return math.hypot(*(fluid.velocity or (0.0,)))
+
+
+def box_reach(lower: Vector, upper: Vector, direction: Vector) -> float:
+    """Largest value of direction.x over the box from `lower` to `upper` [m], which may be flat; `direction` is (dim,)."""
+    return sum(max(d * a, d * b) for d, a, b in zip(direction, lower, upper, strict=True))
 
 
 def corners(shape: Box | Block | Sphere) -> list[Vector]:
@@ -228,9 +172,9 @@ def _check_corners(lower: Vector, upper: Vector) -> None:
         raise ValueError(f"upper {upper} must exceed lower {lower} in every component")
 
 
-def _check_velocity(velocity: Vector | LinearField | None, dim: int, kind: str) -> None:
+def _check_velocity(velocity: Vector | Field | None, dim: int, kind: str) -> None:
     if velocity is None:
         return
-    size, text = (velocity.dim, "field") if isinstance(velocity, LinearField) else (len(velocity), str(velocity))
+    size, text = (velocity.dim, "field") if isinstance(velocity, Field) else (len(velocity), str(velocity))
     if size != dim:
         raise ValueError(f"velocity {text} has {size} components; the {kind} has {dim}")

@@ -12,20 +12,37 @@ from taichi_rts import backend as backends
 from taichi_rts.diagnostics import Energy, Overhead, Tally, measure_energy
 from taichi_rts.errors import Error, SimulationDivergedError, TimeError
 from taichi_rts.grid import BlockGrid, Geometry
+from taichi_rts.inflow import Inflows
 from taichi_rts.motion import Motion
 from taichi_rts.particles import Neighbourhood, Particles
+from taichi_rts.physics.continuity import ContinuityDensity, DensityDiffusion, MirroredPressure
 from taichi_rts.physics.density import SummationDensity
 from taichi_rts.physics.medium import Medium
-from taichi_rts.physics.momentum import MomentumEquation, Pressure
+from taichi_rts.physics.momentum import Gravity, MomentumEquation, Pressure
+from taichi_rts.physics.moving_walls import MovingFace
 from taichi_rts.physics.viscosity import viscosity_terms
 from taichi_rts.physics.walls import Walls
-from taichi_rts.sampling import sample
+from taichi_rts.sampling import Sample, sample
 from taichi_rts.scene import Scene
 from taichi_rts.stepping.base import Stepper
 from taichi_rts.stepping.regional import Regional
 
 REORDER_EVERY = 32  # sorts between moving the state itself into the grid's order, for locality only
 COUNTER_LIMIT = 2**30  # counts on the device are 32-bit; they are collected before they can overflow
+
+
+DENSITIES: dict[str, Any] = {"summation": SummationDensity, "continuity": ContinuityDensity}
+
+
+def make_walls(
+    scene: Scene, start: Sample, near: Neighbourhood, geometry: Geometry, backend: backends.Backend
+) -> list[Any]:
+    """Return the walls at rest, if there are any, and each moving face."""
+    layers = [start.walls.choose(start.owners == number) for number in range(len(scene.moving_walls))]
+    rest = start.walls.choose(start.owners == -1)
+    still: list[Any] = [Walls(rest, near, geometry, backend)] if len(rest.positions) else []
+    moving = zip(scene.moving_walls, layers, strict=True)
+    return still + [MovingFace(wall, layer, near, geometry, backend) for wall, layer in moving]
 
 
 class Simulation:
@@ -45,32 +62,41 @@ class Simulation:
         self.medium = Medium.of(scene, start.mass)
         self.timeline = self.stepper.timeline(scene)
 
+        density = DENSITIES[scene.density]
+        wanted = {
+            "rho_rate": self.stepper.extrapolates_density,
+            "past": self.stepper.keeps_past,
+            "viscosity": len(set(scene.viscosities)) > 1,
+            "guided_until": bool(scene.inflows),
+            "budget": debug,
+        }
+        needs = density.needs | {name for name, needed in wanted.items() if needed}
+        self.inflows = Inflows(scene, start.mass) if scene.inflows else None
+        capacity = len(start.positions) + (self.inflows.capacity if self.inflows else 0)
         self.particles = Particles(
-            start.positions,
-            start.velocities,
-            scene.rest_density,
-            backend,
-            with_rho_rate=self.stepper.extrapolates_density,
-            with_past=self.stepper.keeps_past,
-            with_budget=debug,
+            start.positions, start.velocities, start.densities, scene.rest_density, backend, needs, capacity
         )
+        if self.particles.has_viscosity:
+            unborn = capacity - len(start.positions)
+            self.particles.viscosity.from_numpy(np.pad(start.viscosities, (0, unborn)).astype(backend.numpy_dtype))
         drift = self.stepper.drift * scene.support
-        geometry = Geometry(scene.domain.lower, scene.domain.upper, scene.support, drift)
-        self.grid = BlockGrid(geometry, self.particles.count)
-        self.near = Neighbourhood(self.particles.count, scene.dim, backend)
-        self.walls = Walls(start.wall_positions, start.wall_volumes, geometry, backend) if scene.walls else None
-        self.density = SummationDensity(self.particles, self.near, self.grid, self.walls, self.medium, backend)
-        terms = [Pressure(self.near), *viscosity_terms(scene, self.medium, self.near)]
+        geometry = Geometry(scene.domain.lower, scene.domain.upper, scene.support, drift, scene.is_periodic)
+        self.grid = BlockGrid(geometry, capacity, self.particles.alive)
+        self.near = Neighbourhood(capacity, scene.dim, backend, needs)
+        self.walls = make_walls(scene, start, self.near, geometry, backend)
+        self.density = density(self.particles, self.near, self.grid, self.walls, self.medium, backend)
+        gravity = Gravity(scene)
+        pressure = MirroredPressure(self.near, scene) if density.integrates else Pressure(self.near)
         momentum = MomentumEquation(
-            terms,
+            [pressure, *viscosity_terms(scene, self.medium, self.near)],
             self.near,
             self.grid,
             self.walls,
             self.medium,
-            scene.acceleration,
+            gravity,
             backend,
-            scene.body_force,
             with_rho_rate=self.particles.has_rho_rate,
+            diffusion=DensityDiffusion(self.near, self.medium, scene) if density.integrates else None,
         )
         self.motion = Motion(
             self.particles,
@@ -79,14 +105,16 @@ class Simulation:
             momentum,
             self.stepper.make_integrator(),
             self.medium,
+            integrates_density=density.integrates,
         )
         self.schedule = self.stepper.schedule(scene, self.particles, self.grid, self.timeline)
         self.schedule.debug = debug
 
-        self.overhead = Overhead(self.particles.count)
-        self._tally = Tally(self.particles.count, self.schedule.levels)
+        self.overhead = Overhead(self.particles)
+        self._tally = Tally(self.schedule.levels)
         self._sorts = 0
         self._time = 0.0
+        self._gravity_work = 0.0
         self._initial_momentum = self.momentum()
         began = clock.perf_counter()
         self.step()  # lines 1-2: validity 0, so everybody is due at tick 0, where the first forces are evaluated
@@ -105,11 +133,17 @@ class Simulation:
             schedule.select(now, tick)  # lines 5-16
             self.motion.predict_neighbourhood(schedule.read_at, now, tick)  # lines 25-26, where somebody looks
         with self.overhead.due:
-            self.density.update(schedule.due, schedule.due_count)  # lines 18-21
-            self.motion.advance_due(schedule.due, schedule.due_count, schedule.read_at, now, tick)  # lines 22-29
+            due = (schedule.due, schedule.due_count, schedule.read_at, now, tick)
+            if self.motion.moving_walls:
+                self.motion.observe_walls(*due)
+            self.density.update(*due)  # lines 18-21
+            self.motion.advance_due(*due)  # lines 22-29
         schedule.observe(now, tick)
 
     def _sort(self, now: int, tick: float) -> None:
+        if self.inflows and self.inflows.waiting(now * tick):
+            self._collect_counts()
+            self.inflows.enter(self.particles, now, tick)
         if self._sorts % REORDER_EVERY == 0:
             self.particles.reorder(self.grid.order)
         self._sorts += 1
@@ -124,6 +158,18 @@ class Simulation:
         """
         if time < self._time:
             raise TimeError(f"time {time:g} s lies before the present {self._time:g} s; runs only go forward")
+        for change in self.scene.gravity_changes:
+            if self._time < change.time <= time:  # the potential energy jumps there
+                self._advance(change.time)
+                self._gravity_work += self._potential(change.time) - self._potential(np.nextafter(change.time, 0.0))
+        self._advance(time)
+        self._check_finite()
+
+    def _potential(self, time: float) -> float:
+        """Potential energy [J] that the present positions have in the gravity of `time` [s]."""
+        return measure_energy(self.scene, self.medium, *self.state()[:3], time).potential
+
+    def _advance(self, time: float) -> None:
         target = self.timeline.ticks_until(time)
         ti.sync()
         began = clock.perf_counter()
@@ -136,11 +182,10 @@ class Simulation:
         self._tally.wall_seconds += clock.perf_counter() - began
         self._collect_counts()
         self._time = float(time)
-        self._check_finite()
 
     def _collect_counts(self) -> None:
         if steps := self.schedule.steps - self._tally.base_steps:
-            self._tally.add(steps, *self.schedule.take_counts())
+            self._tally.add(steps, self.particles.count, *self.schedule.take_counts())
 
     def _check_finite(self) -> None:
         broken = int(self.motion.not_finite[None])
@@ -196,17 +241,13 @@ class Simulation:
 
     def steps(self) -> np.ndarray:
         """Steps [s], (N,): level times base step (`Uniform(adaptive=True)`: at most). In order of particle id."""
-        return self._by_identity(self.particles.level.to_numpy()) * self.base_step
+        return self.particles.to_numpy(self.particles.level) * self.base_step
 
     def leads(self) -> np.ndarray:
         """How far [s] the end of each particle's step lies ahead of the earliest end, (N,). In order of particle id."""
-        ends = self.particles.updated.to_numpy() + self.particles.level.to_numpy() * self.schedule.base_ticks
-        return self._by_identity(ends - ends.min()) * self.timeline.tick
-
-    def _by_identity(self, values: np.ndarray) -> np.ndarray:
-        ordered = np.empty_like(values)
-        ordered[self.particles.identity.to_numpy()] = values
-        return ordered
+        p = self.particles
+        ends = p.to_numpy(p.updated) + p.to_numpy(p.level) * self.schedule.base_ticks
+        return (ends - ends.min()) * self.timeline.tick
 
     @property
     def statistics(self) -> dict[str, Any]:
@@ -227,20 +268,44 @@ class Simulation:
     def energy(self) -> Energy:
         """Kinetic, potential and internal energy [J] at `time`."""
         x, v, rho, _ = self.state()
-        return measure_energy(self.scene, self.medium, x, v, rho)
+        return measure_energy(self.scene, self.medium, x, v, rho, self._time)
+
+    def work(self) -> float:
+        """Energy [J] that changes of gravity, moving walls and inflows have put in until `time`.
+
+        What flows in brings its kinetic and potential energy. Moving walls and inflows need a debug run, else raises `Error`.
+        """
+        total = self._gravity_work
+        p = self.particles
+        if self.scene.moving_walls or self.inflows:
+            if not p.has_budget:
+                raise Error("the work of moving walls and inflows needs Simulation(..., debug=True)")
+            elapsed = self._time - p.to_numpy(p.updated) * self.timeline.tick
+            done = p.to_numpy(p.work).astype(float) + elapsed * p.to_numpy(p.power)
+            total += self.medium.mass * float(done.sum()) + (self.inflows.energy if self.inflows else 0.0)
+        return total
 
     def momentum(self) -> np.ndarray:
         """Total momentum [kg m/s], (dim,), at `time`."""
         return self.medium.mass * self.velocities().astype(np.float64).sum(axis=0)
 
+    @property
+    def keeps_momentum_budget(self) -> bool:
+        """Whether `momentum_drift` can say anything."""
+        scene = self.scene
+        return self.particles.has_budget and not (scene.body_force or scene.gravity_changes or scene.inflows)
+
     def momentum_drift(self) -> np.ndarray:
         """Momentum [kg m/s], (dim,), that no outer force accounts for: the change less gravity's and the walls' share.
 
         Zero to rounding with uniform steps, where partners push each other equally at the same time. Needs a debug run and a
-        scene without body force, else raises `Error`.
+        scene without body force, changes of gravity and inflows, else raises `Error`.
         """
-        if not self.particles.has_budget or self.scene.body_force is not None:
-            raise Error("the momentum budget needs Simulation(..., debug=True) and a scene without body_force")
+        if not self.keeps_momentum_budget:
+            raise Error(
+                "the momentum budget needs Simulation(..., debug=True), "
+                "and a scene without body_force, gravity_changes and inflows"
+            )
         p = self.particles
         elapsed = self._time - p.updated.to_numpy() * self.timeline.tick
         walls = p.wall_push.to_numpy().astype(float) + elapsed[:, None] * p.a_walls.to_numpy()

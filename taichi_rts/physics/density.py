@@ -1,5 +1,6 @@
 """Density by summation, and the pass that gives every due particle its density and pressure."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import taichi as ti
@@ -8,7 +9,6 @@ from taichi_rts.backend import Backend
 from taichi_rts.grid import BlockGrid, make_neighbour_sum
 from taichi_rts.particles import Neighbourhood, Particles
 from taichi_rts.physics.medium import Medium
-from taichi_rts.physics.walls import Walls
 
 
 @ti.data_oriented
@@ -18,24 +18,27 @@ class SummationDensity:
     Its rate of change comes out of the momentum equation's loop, which has grad W at hand (`MomentumEquation`).
     """
 
+    integrates = False
+    needs: frozenset[str] = frozenset()
+
     def __init__(
         self,
         particles: Particles,
         near: Neighbourhood,
         grid: BlockGrid,
-        walls: Walls | None,
+        walls: Sequence[Any],
         medium: Medium,
         backend: Backend,
     ) -> None:
         self.particles = particles
         self.near = near
         self.grid = grid
-        self.walls: Any = walls
-        self.has_walls = walls is not None
+        self.walls = list(walls)
         self.equation_of_state = medium.equation_of_state
         self.keeps_past = particles.has_past
         kernel, mass, rest_density = medium.kernel, medium.mass, medium.rest_density
-        tiny = (1e-6 * medium.support) ** 2
+        geometry = grid.geometry
+        tiny = medium.tiny
 
         @ti.func
         def value(x_ij):
@@ -43,27 +46,30 @@ class SummationDensity:
 
         @ti.func
         def fluid_pair(i, j):
-            return mass * value(near.x[i] - near.x[j])
+            return mass * value(geometry.difference(near.x[i], near.x[j]))
 
-        @ti.func
-        def wall_pair(i, b):
-            return rest_density * walls.volume[b] * value(near.x[i] - walls.x[b])
+        def wall_pair(wall: Any) -> Any:
+            @ti.func
+            def pair(i, b):
+                return rest_density * wall.volume[b] * value(wall.difference(i, b))
 
-        self.sum_fluid = make_neighbour_sum(grid.geometry, grid.start, fluid_pair, 1, backend)
-        if walls is not None:
-            self.sum_walls = make_neighbour_sum(grid.geometry, walls.start, wall_pair, 1, backend)
+            return pair
+
+        self.sum_fluid = make_neighbour_sum(geometry, grid.start, fluid_pair, 1, backend)
+        self.sum_walls = [make_neighbour_sum(geometry, wall.start, wall_pair(wall), 1, backend) for wall in self.walls]
 
     @ti.kernel
-    def update(self, due: ti.template(), due_count: ti.template()):
+    def update(self, due: ti.template(), due_count: ti.template(), read_at: ti.template(), now: ti.i32, tick: float):
         """Find density [kg/m^3] and p/rho^2 of the due particles, which stand at places `due[0 .. due_count]`."""
         for n in range(due_count[None]):
             k = due[n]
             i = self.grid.order[k]
             x, cell = self.near.x[k], self.grid.cell_of[i]
             total = self.sum_fluid(k, x, cell)
-            if ti.static(self.has_walls):
-                if self.walls.near[self.grid.block(i)] == 1:
-                    total += self.sum_walls(k, x, cell)
+            for w in ti.static(range(len(self.walls))):
+                y, there = self.walls[w].seen_from(k, cell)
+                if self.walls[w].near[self.grid.block_of(there)] == 1:
+                    total += self.sum_walls[w](k, y, there)
             rho = total[0]
             if ti.static(self.keeps_past):
                 self.particles.past_rho[i] = self.particles.rho[i]

@@ -25,6 +25,11 @@ class Medium:
     kernel: Any
     equation_of_state: Tait
 
+    @property
+    def tiny(self) -> float:
+        """A squared length [m^2] that keeps grad W of a particle on itself, which is zero, from becoming 0/0."""
+        return (1e-6 * self.support) ** 2
+
     @classmethod
     def of(cls, scene: Scene, mass: float) -> Medium:
         """Work out the constants of `scene` for particles of `mass` [kg]."""
@@ -34,5 +39,5 @@ class Medium:
             support=scene.support,
             sound_speed=scene.wave_speed,
             kernel=make_kernel(scene.kernel, scene.dim, scene.support),
-            equation_of_state=Tait(scene.rest_density, scene.wave_speed),
+            equation_of_state=Tait(scene.rest_density, scene.wave_speed, scene.background_pressure),
         )

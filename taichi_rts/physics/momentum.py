@@ -9,8 +9,7 @@ from taichi_rts.backend import Backend
 from taichi_rts.grid import BlockGrid, make_neighbour_sum
 from taichi_rts.particles import Neighbourhood
 from taichi_rts.physics.medium import Medium
-from taichi_rts.physics.walls import Walls
-from taichi_rts.shapes import LinearField
+from taichi_rts.scene import Scene
 
 
 @ti.data_oriented
@@ -31,21 +30,51 @@ class Pressure:
         return -(self.near.p_over_rho2[i] + self.near.p_over_rho2[j]) * x_ij
 
     @ti.func
-    def wall_pair(self, i, b, x_ib, d2):
+    def wall_pair(self, i, b, x_ib, v_ib, d2, wall: ti.template()):
         """Acceleration per unit of rho_0 V_b times the gradient factor."""
         return -self.near.p_over_rho2[i] * x_ib
+
+
+@ti.data_oriented
+class Gravity:
+    """Gravity and the body force: what accelerates fluid without neighbours."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.gravity = scene.acceleration
+        self.changes = [(change.time, change.gravity) for change in scene.gravity_changes]
+        self.dim = scene.dim
+        force = scene.body_force
+        self.has_body_force = force is not None
+        if force is not None:
+            self.force_gradient = force.gradient
+            self.force_origin, self.force_value = force.base
+
+    @ti.func
+    def acceleration(self, x, time):
+        """Acceleration [m/s^2], (dim,), at position `x` [m] and `time` [s]."""
+        total = ti.Vector(self.gravity)
+        for change in ti.static(self.changes):
+            if time >= change[0]:
+                total = ti.Vector(change[1])
+        if ti.static(self.has_body_force):
+            for d in ti.static(range(self.dim)):
+                total[d] += self.force_value[d]
+                for e in ti.static(range(self.dim)):
+                    total[d] += self.force_gradient[d][e] * (x[e] - self.force_origin[e])
+        return total
 
 
 @ti.data_oriented
 class MomentumEquation:
     """Adds up the terms' accelerations for one particle, and with them, if wanted, the rate of its density.
 
-    The rate is d rho_i/dt = sum_j m v_ij . grad W_ij + sum_b rho_0 V_b v_i . grad W_ib, the derivative of `SummationDensity`
-    beside walls at rest; with it the density of a particle that is not due can be carried through its step. Both come as one
-    vector of "rates": dv/dt [m/s^2], (dim,), and with `with_rho_rate` as its last entry d rho/dt [kg/(m^3 s)].
+    The rate is d rho_i/dt = sum_j m v_ij . grad W_ij + sum_b rho_0 V_b v_ib . grad W_ib, the derivative of
+    `SummationDensity`; with it the density of a particle that is not due can be carried through its step. All come as one
+    vector of "rates": dv/dt [m/s^2], (dim,), with `with_rho_rate` then d rho/dt [kg/(m^3 s)], with a `diffusion` of the
+    density, such as `DensityDiffusion`, that last.
 
-    A term is an object with two ti.funcs, `fluid_pair(i, j, x_ij, d2)` and `wall_pair(i, b, x_ib, d2)`, that return the
-    acceleration per unit of mass times gradient factor (see `smoothing`), as a vector.
+    A term is an object with two ti.funcs, `fluid_pair(i, j, x_ij, d2)` and `wall_pair(i, b, x_ib, v_ib, d2, wall)`, that
+    return the acceleration per unit of mass times gradient factor (see `smoothing`), as a vector.
     """
 
     def __init__(
@@ -53,28 +82,25 @@ class MomentumEquation:
         terms: Sequence[Any],
         near: Neighbourhood,
         grid: BlockGrid,
-        walls: Walls | None,
+        walls: Sequence[Any],
         medium: Medium,
-        gravity: Sequence[float],
+        gravity: Gravity,
         backend: Backend,
-        body_force: LinearField | None = None,
         *,
         with_rho_rate: bool = False,
+        diffusion: Any = None,
     ) -> None:
         self.grid = grid
         self.near = near
-        self.walls = walls
-        self.has_walls = walls is not None
+        self.walls = list(walls)
         self.dtype = backend.dtype
-        self.gravity = tuple(gravity)
-        self.has_body_force = body_force is not None
-        if body_force is not None:
-            self.force_gradient = body_force.gradient
-            self.force_origin, self.force_value = body_force.base
-        self.dim = dim = grid.geometry.dim
-        self.width = width = dim + int(with_rho_rate)
+        self.gravity = gravity
+        geometry = grid.geometry
+        self.dim = dim = geometry.dim
+        diffuses = diffusion is not None
+        self.width = width = dim + int(with_rho_rate) + int(diffuses)
         kernel, mass, rest_density = medium.kernel, medium.mass, medium.rest_density
-        tiny = (1e-6 * medium.support) ** 2  # keeps grad W of a particle on itself, which is zero, from becoming 0/0
+        tiny = medium.tiny
         terms = list(terms)
 
         @ti.func
@@ -89,47 +115,78 @@ class MomentumEquation:
 
         @ti.func
         def fluid_pair(i, j):
-            x_ij = near.x[i] - near.x[j]
+            x_ij = geometry.difference(near.x[i], near.x[j])
             d2 = x_ij.norm_sqr()
             acceleration = ti.Vector.zero(backend.dtype, dim)
             for term in ti.static(terms):
                 acceleration += term.fluid_pair(i, j, x_ij, d2)
-            return mass * kernel.gradient_factor(ti.sqrt(d2 + tiny)) * rates(acceleration, near.v[i] - near.v[j], x_ij)
+            result = rates(acceleration, near.v[i] - near.v[j], x_ij)
+            if ti.static(diffuses):
+                result[width - 1] = diffusion.fluid_pair(i, j, x_ij, d2)
+            return mass * kernel.gradient_factor(ti.sqrt(d2 + tiny)) * result
 
         @ti.func
-        def wall_pair(i, b):
-            x_ib = near.x[i] - walls.x[b]
-            d2 = x_ib.norm_sqr()
+        def wall_acceleration(i, b, x_ib, v_ib, d2, wall: ti.template()):
             acceleration = ti.Vector.zero(backend.dtype, dim)
             for term in ti.static(terms):
-                acceleration += term.wall_pair(i, b, x_ib, d2)
-            factor = rest_density * walls.volume[b] * kernel.gradient_factor(ti.sqrt(d2 + tiny))
-            return factor * rates(acceleration, near.v[i], x_ib)
+                acceleration += term.wall_pair(i, b, x_ib, v_ib, d2, wall)
+            return acceleration
 
-        self.sum_fluid = make_neighbour_sum(grid.geometry, grid.start, fluid_pair, width, backend)
-        if walls is not None:
-            self.sum_walls = make_neighbour_sum(grid.geometry, walls.start, wall_pair, width, backend)
+        def wall_pair(wall: Any) -> Any:
+            @ti.func
+            def pair(i, b):
+                x_ib, v_ib = wall.difference(i, b), wall.relative_velocity(i, b)
+                d2 = x_ib.norm_sqr()
+                factor = rest_density * wall.volume[b] * kernel.gradient_factor(ti.sqrt(d2 + tiny))
+                return factor * rates(wall_acceleration(i, b, x_ib, v_ib, d2, wall), v_ib, x_ib)
+
+            return pair
+
+        def power_pair(wall: Any) -> Any:
+            @ti.func
+            def pair(i, b):
+                x_ib, v_ib = wall.difference(i, b), wall.relative_velocity(i, b)
+                d2 = x_ib.norm_sqr()
+                factor = rest_density * wall.volume[b] * kernel.gradient_factor(ti.sqrt(d2 + tiny))
+                return ti.Vector([factor * wall_acceleration(i, b, x_ib, v_ib, d2, wall).dot(near.v[i] - v_ib)])
+
+            return pair
+
+        self.sum_fluid = make_neighbour_sum(geometry, grid.start, fluid_pair, width, backend)
+        self.sum_walls = [
+            make_neighbour_sum(geometry, wall.start, wall_pair(wall), width, backend) for wall in self.walls
+        ]
+        self.moving = [wall for wall in self.walls if wall.moves]
+        self.sum_power = [
+            make_neighbour_sum(geometry, wall.start, power_pair(wall), 1, backend) for wall in self.moving
+        ]
 
     @ti.func
     def wall_rates(self, k):
         """The walls' share of the rates, (width,), of the particle at place `k`."""
         total = ti.Vector.zero(self.dtype, self.width)
-        if ti.static(self.has_walls):
-            i = self.grid.order[k]
-            if self.walls.near[self.grid.block(i)] == 1:
-                total = self.sum_walls(k, self.near.x[k], self.grid.cell_of[i])
+        for w in ti.static(range(len(self.walls))):
+            x, cell = self.walls[w].seen_from(k, self.grid.cell_of[self.grid.order[k]])
+            if self.walls[w].near[self.grid.block_of(cell)] == 1:
+                total += self.sum_walls[w](k, x, cell)
         return total
 
     @ti.func
-    def other_rates(self, k):
-        """All but the walls' share of the rates, (width,), of the particle at place `k`."""
+    def wall_power(self, k):
+        """Power [W/kg] of moving walls on the particle at place `k`: their accelerations times their velocities."""
+        total = ti.Vector.zero(self.dtype, 1)
+        for w in ti.static(range(len(self.moving))):
+            x, cell = self.moving[w].seen_from(k, self.grid.cell_of[self.grid.order[k]])
+            if self.moving[w].near[self.grid.block_of(cell)] == 1:
+                total += self.sum_power[w](k, x, cell)
+        return total[0]
+
+    @ti.func
+    def other_rates(self, k, time):
+        """All but the walls' share of the rates, (width,), of the particle at place `k` at `time` [s]."""
         x = self.near.x[k]
         total = self.sum_fluid(k, x, self.grid.cell_of[self.grid.order[k]])
+        outer = self.gravity.acceleration(x, time)
         for d in ti.static(range(self.dim)):
-            total[d] += self.gravity[d]
-        if ti.static(self.has_body_force):
-            for d in ti.static(range(self.dim)):
-                total[d] += self.force_value[d]
-                for e in ti.static(range(self.dim)):
-                    total[d] += self.force_gradient[d][e] * (x[e] - self.force_origin[e])
+            total[d] += outer[d]
         return total

@@ -29,34 +29,48 @@ class ArtificialViscosity:
         return self.factor * approach / ((self.near.rho[i] + self.near.rho[j]) * (d2 + self.regular)) * x_ij
 
     @ti.func
-    def wall_pair(self, i, b, x_ib, d2):
-        """The same against a wall at rest, which has the particle's density."""
-        approach = ti.min(self.near.v[i].dot(x_ib), 0.0)
+    def wall_pair(self, i, b, x_ib, v_ib, d2, wall: ti.template()):
+        """The same against a wall, which has the particle's density."""
+        approach = ti.min(v_ib.dot(x_ib), 0.0)
         return 0.5 * self.factor * approach / (self.near.rho[i] * (d2 + self.regular)) * x_ib
 
 
 @ti.data_oriented
 class LaminarViscosity:
-    """Morris, Fox & Zhu 1997, Eq. 22, for one kinematic viscosity nu [m^2/s]; no slip at walls.
+    """Morris, Fox & Zhu 1997, Eq. 22, for the kinematic viscosity nu [m^2/s]; no slip at walls.
 
-    a_i = sum_j m 4 nu / (rho_i + rho_j) (x_ij . grad W) / (|x_ij|^2 + 0.01 h^2) v_ij
+    a_i = sum_j m 4 nu / (rho_i + rho_j) (x_ij . grad W) / (|x_ij|^2 + 0.01 h^2) v_ij. Where fluids differ, nu is
+    2 nu_i nu_j / (nu_i + nu_j), which keeps the stress continuous (Cleary & Monaghan 1999); `nu` is then None.
     """
 
-    def __init__(self, near: Neighbourhood, nu: float, h: float) -> None:
+    def __init__(self, near: Neighbourhood, nu: float | None, h: float) -> None:
         self.near = near
-        self.factor = 4.0 * nu
+        self.nu = nu
+        self.differs = nu is None
         self.regular = 0.01 * h * h
+
+    @ti.func
+    def nu_between(self, i, j):
+        """Viscosity [m^2/s] between the particles at places `i` and `j`."""
+        nu = 0.0
+        if ti.static(self.differs):
+            one, two = self.near.viscosity[i], self.near.viscosity[j]
+            nu = 2.0 * one * two / ti.max(one + two, 1e-30)
+        else:
+            nu = self.nu
+        return nu
 
     @ti.func
     def fluid_pair(self, i, j, x_ij, d2):
         """Acceleration per unit of m times the gradient factor."""
-        scale = self.factor * d2 / ((self.near.rho[i] + self.near.rho[j]) * (d2 + self.regular))
+        scale = 4.0 * self.nu_between(i, j) * d2 / ((self.near.rho[i] + self.near.rho[j]) * (d2 + self.regular))
         return scale * (self.near.v[i] - self.near.v[j])
 
     @ti.func
-    def wall_pair(self, i, b, x_ib, d2):
-        """The same against a wall at rest, which has the particle's density."""
-        return 0.5 * self.factor * d2 / (self.near.rho[i] * (d2 + self.regular)) * self.near.v[i]
+    def wall_pair(self, i, b, x_ib, v_ib, d2, wall: ti.template()):
+        """The same against a wall, which has the particle's density and viscosity, with no slip on its face."""
+        scale = 2.0 * self.nu_between(i, i) * d2 / (self.near.rho[i] * (d2 + self.regular))
+        return scale * wall.shear(b, x_ib) * v_ib
 
 
 def viscosity_terms(scene: Scene, medium: Medium, near: Neighbourhood) -> list[Any]:
@@ -65,6 +79,7 @@ def viscosity_terms(scene: Scene, medium: Medium, near: Neighbourhood) -> list[A
     terms: list[Any] = []
     if scene.artificial_viscosity > 0.0:
         terms.append(ArtificialViscosity(near, scene.artificial_viscosity, h, medium.sound_speed))
-    if scene.kinematic_viscosity > 0.0:
-        terms.append(LaminarViscosity(near, scene.kinematic_viscosity, h))
+    if max(scene.viscosities) > 0.0:
+        same = len(set(scene.viscosities)) == 1
+        terms.append(LaminarViscosity(near, scene.viscosities[0] if same else None, h))
     return terms

@@ -13,29 +13,67 @@ import taichi as ti
 
 from taichi_rts.backend import Backend
 from taichi_rts.grid import CELLS_PER_BLOCK, Geometry
-from taichi_rts.particles import vector_field
+from taichi_rts.particles import Neighbourhood, vector_field
+from taichi_rts.sampling import WallLayer
+
+LARGEST_SHEAR = 4.0
 
 
 @ti.data_oriented
 class Walls:
-    """Wall particles sorted into the grid's cells once: positions x [m] and volumes [m^dim]; `near` flags blocks that see one."""
+    """Wall particles at rest, sorted into the grid's cells once.
 
-    def __init__(self, positions: np.ndarray, volumes: np.ndarray, geometry: Geometry, backend: Backend) -> None:
+    Positions x [m], volumes [m^dim], and normals into the fluid; `near` flags blocks that see one.
+    """
+
+    moves = False
+
+    def __init__(self, layer: WallLayer, fluid: Neighbourhood, geometry: Geometry, backend: Backend) -> None:
+        positions, volumes = layer.positions, layer.volumes
+        self.fluid = fluid
+        self.geometry = geometry
         self.count = len(positions)
         cell = geometry.cell_numpy(positions)
         order = np.argsort(cell, kind="stable")
         start = np.searchsorted(cell[order], np.arange(geometry.cells + 1))
-        occupied = np.diff(start[::CELLS_PER_BLOCK]) > 0
-        near = occupied.copy()
-        for stride in geometry.neighbour_strides:
-            near |= np.roll(occupied, stride)
+        near = geometry.spread(np.diff(start[::CELLS_PER_BLOCK]) > 0)
         padded = self.count + backend.lanes
         self.x = vector_field(geometry.dim, backend.dtype, padded)
         self.volume = ti.field(backend.dtype, padded)
+        self.normal = vector_field(geometry.dim, backend.dtype, padded)
+        self.depth = layer.depth
+        self.volume_factor = layer.stiffness
         self.start = ti.field(ti.i32, geometry.cells + 1)
         self.near = ti.field(ti.i32, geometry.blocks)
         pad = backend.lanes
         self.x.from_numpy(np.pad(positions[order], ((0, pad), (0, 0))).astype(backend.numpy_dtype))
         self.volume.from_numpy(np.pad(volumes[order], (0, pad)).astype(backend.numpy_dtype))
+        self.normal.from_numpy(np.pad(layer.normals[order], ((0, pad), (0, 0))).astype(backend.numpy_dtype))
         self.start.from_numpy(start.astype(np.int32))
         self.near.from_numpy(near.astype(np.int32))
+
+    @ti.func
+    def seen_from(self, k, cell):
+        """Position [m] and cell, among the wall particles, of the fluid particle at place `k` in `cell`."""
+        return self.fluid.x[k], cell
+
+    @ti.func
+    def difference(self, k, b):
+        """x_k - x_b [m] between the fluid at place `k` and wall particle `b`."""
+        return self.geometry.difference(self.fluid.x[k], self.x[b])
+
+    @ti.func
+    def relative_velocity(self, k, b):
+        """v_k - v_b [m/s]."""
+        return self.fluid.v[k]
+
+    @ti.func
+    def shear(self, b, x_ib):
+        """How much faster than fluid at x_ib [m] from particle `b` that fluid moves past the wall's far side, per its speed.
+
+        With (d_i + d_b)/d_i, d_i and d_b being the distances to the face, velocities go through zero on the face (Morris, Fox &
+        Zhu 1997, Eq. 23), and a linear profile along a resting lattice feels no force, as it should. Bounded, because fluid
+        may come arbitrarily close.
+        """
+        distance = self.normal[b].dot(x_ib)
+        return ti.min(distance / ti.max(distance - self.depth, 1e-3 * self.depth), LARGEST_SHEAR) / self.volume_factor

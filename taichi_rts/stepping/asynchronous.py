@@ -29,6 +29,7 @@ from taichi_rts.scene import Positive, Scene
 from taichi_rts.stepping import criteria
 from taichi_rts.stepping.base import Courant, Schedule
 from taichi_rts.stepping.limiter import BlockLimiter, NeighbourLimiter
+from taichi_rts.stepping.limits import BlockMaxima
 from taichi_rts.stepping.timeline import Timeline
 from taichi_rts.validation import FROZEN, validated
 
@@ -47,7 +48,7 @@ class Asynchronous:
 
     Attributes:
         courant: the longest step is courant r/c_s; a cell faster than Mach 0.1 takes 1.1 courant r/(c_s + |v|). None: 0.4.
-        levels: base steps (ticks) in the longest step; 1 forces all steps equal.
+        levels: base steps (ticks) in the longest step, more if the most viscous fluid needs shorter ones; 1 forces all equal.
         steps: lengths that steps may have, in ticks: "powers_of_two" keeps cells in step with each other, so that many can
             step at once; "integers" rounds the limits down to whole ticks only.
         lambda_f: factor of the force limit, Eq. 2 of Goswami & Batty 2014.
@@ -101,13 +102,21 @@ class Asynchronous:
         """Return the integrator's object: second order for any sequence of steps, corrected with the time that elapsed."""
         return Serna()
 
+    def longest_step(self, scene: Scene) -> float:
+        """The longest step [s] that any cell may take: with all equal the one that all may take."""
+        acoustic = criteria.acoustic_step(self.longest_courant, scene.support, scene.wave_speed)
+        return min(acoustic, criteria.scene_viscous_step(scene, most=self.levels == 1))
+
+    def ticks(self, scene: Scene) -> int:
+        """Ticks in the longest step: `levels`, doubled until one tick is within the viscous limit of every fluid."""
+        ticks, longest, viscous = self.levels, self.longest_step(scene), criteria.scene_viscous_step(scene)
+        while self.levels > 1 and longest / ticks > viscous:
+            ticks *= 2
+        return ticks
+
     def timeline(self, scene: Scene) -> Timeline:
-        """Return a clock that ticks `levels` times in the longest step."""
-        step = min(
-            criteria.acoustic_step(self.longest_courant, scene.support, scene.wave_speed),
-            criteria.viscous_step(scene.support, scene.kinematic_viscosity),
-        )
-        return Timeline(step / self.levels)
+        """Return a clock that ticks `ticks` times in the longest step."""
+        return Timeline(self.longest_step(scene) / self.ticks(scene))
 
     def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
         """Build the fields and kernels that find the cells that may step."""
@@ -135,7 +144,8 @@ class AsynchronousSchedule(Schedule):
         self.stepper = stepper
         self.scene = scene
         self.tick = timeline.tick
-        self.levels = stepper.levels
+        self.levels = stepper.ticks(scene)
+        self.maxima = BlockMaxima(scene, particles, grid)
         self.powers_of_two = stepper.steps == "powers_of_two"
         self.staggered = stepper.stagger is not None
         self.seed = stepper.stagger or 0
@@ -143,6 +153,7 @@ class AsynchronousSchedule(Schedule):
         self.limiter = NeighbourLimiter(doubling=True, aligned=self.powers_of_two)
         self.fast_reach = (1.0 + MACH) * stepper.longest_courant * scene.support  # [m]
         self.slow_speed = MACH * scene.wave_speed
+        self.viscous_reach = criteria.viscous_step(scene.support, 1.0) * (1.0 + 1e-6)  # [m^2]
         blocks = grid.geometry.blocks
         self.blocks = blocks
         self.occupied = ti.field(ti.i32, blocks)
@@ -238,7 +249,7 @@ class AsynchronousSchedule(Schedule):
     def find_drift_time(self, now: ti.i32, tick: float):
         """The shortest time [s] from `now` in which |v| t + |a| t^2/2 of some particle is all the drift that the grid allows."""
         self.drift_time[None] = self.levels * self.tick
-        for i in range(self.particles.count):
+        for i in range(self.particles.alive[None]):
             a = self.particles.a[i].norm()
             elapsed = ti.cast(now - self.particles.updated[i], float) * tick
             v = (self.particles.v[i] + self.particles.a[i] * elapsed).norm()
@@ -378,8 +389,8 @@ class AsynchronousSchedule(Schedule):
         for m in range(self.occupied_count[None]):
             block = self.occupied[m]
             due = self.block_due[block]
-            for stride in ti.static(self.grid.geometry.neighbour_strides):
-                due = ti.max(due, self.block_due[block + stride])
+            for k in ti.static(range(len(self.grid.geometry.offsets))):
+                due = ti.max(due, self.block_due[self.grid.geometry.beside(block, k)])
             self.read_at[block] = self.claim[block] - now if due > 0 else -1
 
     def check(self, now: int) -> None:
@@ -422,13 +433,8 @@ class AsynchronousSchedule(Schedule):
             step = self.step[block]
             if self.block_due[block] > 0:
                 time = self.time[block]
-                speed2, acceleration2 = 0.0, 0.0
-                for k in range(self.grid.first(block), self.grid.first(block + 1)):
-                    i = self.grid.order[k]
-                    a = self.particles.a[i]
-                    v = self.particles.v[i] + a * (ti.cast(time - self.particles.updated[i], float) * tick)
-                    speed2, acceleration2 = ti.max(speed2, v.norm_sqr()), ti.max(acceleration2, a.norm_sqr())
-                wanted = self.longest_step(tick, ti.sqrt(speed2), ti.sqrt(acceleration2))
+                speed2, acceleration2, viscosity = self.maxima.of(block, time, tick)
+                wanted = self.longest_step(tick, ti.sqrt(speed2), ti.sqrt(acceleration2), viscosity)
                 if ti.static(self.staggered):
                     if step == 0:
                         wanted = 1 + ti.cast(self.noise(block) % ti.cast(wanted, ti.u32), ti.i32)
@@ -440,13 +446,15 @@ class AsynchronousSchedule(Schedule):
             self.proposal[block] = step
 
     @ti.func
-    def longest_step(self, tick, speed, acceleration):
-        """Smallest of the CFL limit with |v|, the force limit and the longest step, rounded down to at least one tick."""
+    def longest_step(self, tick, speed, acceleration, viscosity):
+        """Smallest of the CFL limit with |v|, the force and viscous limits and the longest step, rounded down to >= 1 tick."""
         step = ti.cast(self.levels, float)
         if speed > self.slow_speed:
             step = ti.min(step, self.fast_reach / ((self.scene.wave_speed + speed) * tick))
         if acceleration > 0.0:
             step = ti.min(step, self.stepper.lambda_f * ti.sqrt(self.scene.support / acceleration) / tick)
+        if viscosity > 0.0:
+            step = ti.min(step, self.viscous_reach / (viscosity * tick))
         if step < 1.0:
             self.clamped[None] += 1
         return ti.max(1, ti.cast(ti.floor(step), ti.i32))
@@ -503,9 +511,10 @@ class AsynchronousSchedule(Schedule):
                 if self.read_at[block] >= 0:
                     # A cell's own older particles, which did not step with the others, are woken as well.
                     shortest = self.step[block] if self.block_due[block] > 0 else self.EMPTY
-                    for stride in ti.static(self.grid.geometry.neighbour_strides):
-                        if self.block_due[block + stride] > 0:
-                            shortest = ti.min(shortest, self.step[block + stride])
+                    for k in ti.static(range(len(self.grid.geometry.offsets))):
+                        other = self.grid.geometry.beside(block, k)
+                        if self.block_due[other] > 0:
+                            shortest = ti.min(shortest, self.step[other])
                     if shortest != self.EMPTY:
                         self.wake(block, now + self.read_at[block], shortest)
 

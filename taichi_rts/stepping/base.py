@@ -66,7 +66,7 @@ class Schedule:
     def __init__(self, particles: Particles, grid: BlockGrid) -> None:
         self.particles = particles
         self.grid = grid
-        self.due = ti.field(ti.i32, particles.count)
+        self.due = ti.field(ti.i32, particles.capacity)
         self.due_count = ti.field(ti.i32, ())
         self.read_at = ti.field(ti.i32, grid.geometry.blocks)
         self.steps = 0

@@ -7,6 +7,8 @@ import math
 
 import taichi as ti
 
+from taichi_rts.scene import Scene
+
 
 def acoustic_step(courant: float, support: float, sound_speed: float) -> float:
     """Goswami & Batty 2014, Eq. 1 [s]: lambda_v r / c_s, for `support` r [m] and `sound_speed` c_s [m/s]."""
@@ -28,9 +30,20 @@ def viscous_step(support: float, kinematic_viscosity: float) -> float:
     return 0.125 * (0.5 * support) ** 2 / kinematic_viscosity if kinematic_viscosity > 0.0 else math.inf
 
 
+def scene_viscous_step(scene: Scene, most: bool = True) -> float:
+    """`viscous_step` [s] of the scene's most viscous fluid, or of its least."""
+    return viscous_step(scene.support, max(scene.viscosities) if most else min(scene.viscosities))
+
+
 def velocity_fraction(level: int, alpha: float, beta: float, beta_decay: float) -> float:
     """Right side of Eq. 3 for level n >= 2: alpha beta_n with beta_n = beta * beta_decay^(n-2)."""
     return alpha * beta * beta_decay ** (level - 2)
+
+
+@ti.func
+def allows_viscosity(step, support: ti.template(), viscosity):
+    """`viscous_step` for a step [s] and the largest kinematic viscosity [m^2/s]: step nu <= 0.125 h^2."""
+    return step * viscosity <= 0.125 * 0.25 * support * support * (1.0 + 1e-6)
 
 
 @ti.func

@@ -16,15 +16,15 @@ class BlockLimiter:
     EMPTY = 1 << 30
 
     def __init__(self, geometry: Geometry) -> None:
-        self.strides = geometry.neighbour_strides
+        self.geometry = geometry
         self.blocks = geometry.blocks
 
     @ti.func
     def shortest_beside(self, steps, block):
         """Shortest step of the blocks around `block`; `EMPTY` if they are."""
         shortest = self.EMPTY
-        for stride in ti.static(self.strides):
-            shortest = ti.min(shortest, steps[block + stride])
+        for k in ti.static(range(len(self.geometry.offsets))):
+            shortest = ti.min(shortest, steps[self.geometry.beside(block, k)])
         return shortest
 
     @ti.func

@@ -16,6 +16,7 @@ from taichi_rts.scene import Positive, Scene
 from taichi_rts.stepping import criteria
 from taichi_rts.stepping.base import Courant, Schedule
 from taichi_rts.stepping.limiter import BlockLimiter, NeighbourLimiter
+from taichi_rts.stepping.limits import BlockMaxima
 from taichi_rts.stepping.timeline import Timeline
 from taichi_rts.validation import FROZEN, validated
 
@@ -94,8 +95,7 @@ class Regional:
         """Return a clock that ticks once a base step: lambda_v r/c_s, divided by n_max if strict."""
         step = criteria.acoustic_step(self.resolved("courant"), scene.support, scene.wave_speed)
         divisor = self.resolved("levels") if self.resolved("strict_cfl") else 1
-        viscous = criteria.viscous_step(scene.support, scene.kinematic_viscosity) / self.resolved("levels")
-        return Timeline(min(step / divisor, viscous))
+        return Timeline(min(step / divisor, criteria.scene_viscous_step(scene)))
 
     def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
         """Build the schedule of Algorithm 1."""
@@ -122,13 +122,14 @@ class RegionalSchedule(Schedule):
         self.blocks = blocks
         self.raw_level = ti.field(ti.i32, blocks)
         self.block_level = ti.field(ti.i32, blocks)
+        self.maxima = BlockMaxima(scene, particles, grid)
         self.beside = BlockLimiter(grid.geometry)
         self.limits = stepper.resolved("limiter")
         self.limiter = NeighbourLimiter(doubling=False)
         self.ratio_sweeps = max(0, math.ceil(math.log2(self.levels)) - 1) if self.limits else 0
         self.grading_sweeps = max(0, self.levels - 2) if stepper.grading else 0
         self.block_level.fill(BlockLimiter.EMPTY)
-        self.flag = ti.field(ti.i32, particles.count)
+        self.flag = ti.field(ti.i32, particles.capacity)
         self.block_due = ti.field(ti.i32, blocks)
         self.due_start = ti.field(ti.i32, blocks + 1)
         self.scan = ExclusiveScan(self.block_due, self.due_start)
@@ -150,33 +151,26 @@ class RegionalSchedule(Schedule):
         """Lines 6-9: maxima of |v| and F/m over each block, and the largest n that Eq. 2 and 3 allow."""
         for block in range(self.blocks):
             first, end = self.grid.first(block), self.grid.first(block + 1)
-            speed2, acceleration2 = 0.0, 0.0
-            for k in range(first, end):
-                i = self.grid.order[k]
-                a = self.particles.a[i]
-                v = self.particles.v[i] + a * (ti.cast(now - self.particles.updated[i], float) * tick)
-                speed2 = ti.max(speed2, v.norm_sqr())
-                acceleration2 = ti.max(acceleration2, a.norm_sqr())
             level = BlockLimiter.EMPTY
             if first < end:
-                level = self.region(tick, speed2, acceleration2)
+                speed2, acceleration2, viscosity = self.maxima.of(block, now, tick)
+                level = self.region(tick, speed2, acceleration2, viscosity)
                 if ti.static(self.limits):
-                    before = self.block_level[
-                        block
-                    ]  # of the last step; a block that was empty has nothing to grow from
+                    before = self.block_level[block]  # of the last step; who was empty has nothing to grow from
                     if before != BlockLimiter.EMPTY:
                         level = self.limiter.settled(level, before, now)
             self.raw_level[block] = level
 
     @ti.func
-    def region(self, base_step, speed2, acceleration2):
-        """Section 2: the largest n whose step satisfies Eq. 2 and Eq. 3 (Eq. 1 is the same for every block)."""
+    def region(self, base_step, speed2, acceleration2, viscosity):
+        """Section 2: the largest n whose step satisfies Eq. 2, Eq. 3 and the viscous limit (Eq. 1 is the same for all blocks)."""
         level = 1
         for n in ti.static(range(2, self.levels + 1)):
             step = base_step * n
             if criteria.allows_force(step, self.lambda_f, self.support, acceleration2):
                 if criteria.allows_velocity(step, ti.static(self.fractions[n - 2]), self.support, speed2):
-                    level = n
+                    if criteria.allows_viscosity(step, self.support, viscosity):
+                        level = n
         return level
 
     def apply_minimum_region(self) -> None:
@@ -226,8 +220,8 @@ class RegionalSchedule(Schedule):
             due = 0
             if self.block_level[block] != BlockLimiter.EMPTY:
                 due = self.block_due[block]
-                for stride in ti.static(self.grid.geometry.neighbour_strides):
-                    due = ti.max(due, self.block_due[block + stride])
+                for k in ti.static(range(len(self.grid.geometry.offsets))):
+                    due = ti.max(due, self.block_due[self.grid.geometry.beside(block, k)])
             self.read_at[block] = 0 if due > 0 else -1
 
     def take_counts(self) -> tuple[list[int], list[int]]:

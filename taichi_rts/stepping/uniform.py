@@ -51,7 +51,7 @@ class Uniform:
         """Return a clock that ticks once a step, or 64 times the largest step if adaptive."""
         step = min(
             criteria.acoustic_step(self.courant, scene.support, scene.wave_speed),
-            criteria.viscous_step(scene.support, scene.kinematic_viscosity),
+            criteria.scene_viscous_step(scene),
         )
         return Timeline(step / SUBDIVISIONS if self.adaptive else step)
 
@@ -69,7 +69,7 @@ class UniformSchedule(Schedule):
     def __init__(self, particles: Particles, grid: BlockGrid) -> None:
         super().__init__(particles, grid)
         particles.level.fill(1)
-        self.due_count[None] = particles.count
+        self.due_count = particles.alive
         self.mark_all()
 
     @ti.kernel
@@ -97,7 +97,7 @@ class AdaptiveSchedule(UniformSchedule):
     def reduce_maxima(self):
         self.speed2[None] = 0.0
         self.acceleration2[None] = 0.0
-        for i in range(self.particles.count):
+        for i in range(self.particles.alive[None]):
             ti.atomic_max(self.speed2[None], self.particles.v[i].norm_sqr())
             ti.atomic_max(self.acceleration2[None], self.particles.a[i].norm_sqr())
 
@@ -108,6 +108,7 @@ class AdaptiveSchedule(UniformSchedule):
     def next_ticks(self) -> int:
         """Ticks of the next step: the smallest of Eq. 1 with c_s + |v|, Eq. 2 and the fixed step."""
         speed, acceleration = math.sqrt(self.speed2[None]), math.sqrt(self.acceleration2[None])
+        speed = max(speed, *(abs(v) for wall in self.scene.moving_walls for v in wall.velocities), 0.0)
         support = self.scene.support
         step = min(
             criteria.advective_step(self.stepper.courant, support, self.scene.wave_speed, speed),

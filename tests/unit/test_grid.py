@@ -98,13 +98,13 @@ def test_neighbour_blocks_of_every_place_in_the_domain_exist(dim):
     assert block.max() + max(geometry.neighbour_strides) < geometry.blocks
 
 
-def test_clamp_catches_what_is_not_a_number(taichi_cpu_f64):
+def test_place_catches_what_is_not_a_number(taichi_cpu_f64):
     geometry = Geometry((0, 0), (1, 2), 0.5)
 
     @ti.kernel
     def clamp(x: ti.types.ndarray()):
         for i in range(x.shape[0]):
-            y = geometry.clamp(ti.Vector([x[i, 0], x[i, 1]]))
+            y = geometry.place(ti.Vector([x[i, 0], x[i, 1]]))
             x[i, 0], x[i, 1] = y[0], y[1]
 
     x = np.array([[0.3, 1.7], [-1, 3], [2, -np.inf], [np.nan, np.inf]])

@@ -55,7 +55,7 @@ def test_no_block_keeps_more_than_its_neighbours_raw_level_plus_jump(taichi_cpu,
 def test_grading_leaves_jumps_of_one_and_only_lowers(taichi_cpu, levels):
     scene = rts.Scene(domain=rts.Box((0, 0), (2, 1)), fluids=[rts.Block((0, 0), (0.4, 0.4))], spacing=0.05)
     geometry = Geometry((0, 0), (2, 1), scene.support)
-    state = Particles(np.zeros((1, 2)), np.zeros((1, 2)), 1000.0, backend.current())
+    state = Particles(np.zeros((1, 2)), np.zeros((1, 2)), np.ones(1), 1.0, backend.current())
     schedule = RegionalSchedule(rts.Regional(levels=levels, grading=True), scene, state, BlockGrid(geometry, 1))
     raw = random_levels(geometry, n_max=levels)
     occupied = raw != EMPTY
@@ -109,7 +109,7 @@ def test_a_woken_step_ends_now_or_where_twice_the_neighbours_step_would_have(tai
 def test_the_limiter_of_regions_halves_the_step_at_most_from_block_to_block(taichi_cpu):
     scene = rts.Scene(domain=rts.Box((0, 0), (2, 1)), fluids=[rts.Block((0, 0), (0.4, 0.4))], spacing=0.05)
     geometry = Geometry((0, 0), (2, 1), scene.support)
-    state = Particles(np.zeros((1, 2)), np.zeros((1, 2)), 1000.0, backend.current())
+    state = Particles(np.zeros((1, 2)), np.zeros((1, 2)), np.ones(1), 1.0, backend.current())
     schedule = RegionalSchedule(rts.Regional(levels=8, limiter=True), scene, state, BlockGrid(geometry, 1))
     raw = random_levels(geometry, n_max=8)
     occupied = raw != EMPTY

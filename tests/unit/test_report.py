@@ -25,7 +25,7 @@ def simulation(stepper, particles, updates, **more):
         stepper=stepper,
         scene=rts.load_scene("dam_break"),
         schedule=SimpleNamespace(levels_double=stepper.name == "asynchronous"),
-        particles=SimpleNamespace(has_budget=False),
+        keeps_momentum_budget=False,
         base_step=0.0005,
         statistics=statistics,
         energy=lambda: Energy(1.0, 2.0, 0.5),

@@ -22,8 +22,8 @@ def density(scene, x, with_walls):
     start = sample(scene)
     rho = start.mass * kernel.sample(np.linalg.norm(x[:, None] - start.positions, axis=2)).sum(axis=1)
     if with_walls:
-        w = kernel.sample(np.linalg.norm(x[:, None] - start.wall_positions, axis=2))
-        rho += scene.rest_density * (w * start.wall_volumes).sum(axis=1)
+        w = kernel.sample(np.linalg.norm(x[:, None] - start.walls.positions, axis=2))
+        rho += scene.rest_density * (w * start.walls.volumes).sum(axis=1)
     return rho
 
 
@@ -56,9 +56,15 @@ def test_walls_complete_the_density_exactly(kernel, dim, ratio):
     assert density(scene, resting, with_walls=True) == pytest.approx(1000.0, rel=1e-9)
 
 
+def wall_particles(scene):
+    layer, owners = line_walls(scene)
+    assert (owners == -1).all()
+    return layer.positions, layer.volumes
+
+
 def test_wall_particles_lie_beyond_the_faces_and_within_reach():
     scene = filled(3)
-    positions, volumes = line_walls(scene)
+    positions, volumes = wall_particles(scene)
     depth, volume = calibrate_walls(scene)
     outside = np.maximum(-positions, positions - 1.0).max(axis=1)
     np.testing.assert_allclose(outside, depth, rtol=1e-12)
@@ -69,7 +75,7 @@ def test_wall_particles_lie_beyond_the_faces_and_within_reach():
 
 def test_wall_spacing_adapts_to_the_domain_and_keeps_the_volume_of_a_face():
     scene = filled(2, size=0.93, top=0.5)
-    positions, volumes = line_walls(scene)
+    positions, volumes = wall_particles(scene)
     _, volume = calibrate_walls(scene)
     floor = (positions[:, 1] < 0) & (positions[:, 0] > 0) & (positions[:, 0] < 0.93)
     assert floor.sum() == 9
@@ -77,7 +83,7 @@ def test_wall_spacing_adapts_to_the_domain_and_keeps_the_volume_of_a_face():
 
 
 def test_scene_without_walls_has_no_wall_particles():
-    positions, volumes = line_walls(filled(3, walls=False))
+    positions, volumes = wall_particles(filled(3, walls=False))
     assert positions.shape == (0, 3)
     assert volumes.shape == (0,)
 

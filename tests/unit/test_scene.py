@@ -58,7 +58,7 @@ def write(folder, text, name="my_scene.toml"):
         ({"gravity": (0, math.nan)}, ["gravity", "finite", "nan"]),
         ({"fluids": []}, ["fluids", "at least 1"]),
         ({"kernel": "gauss"}, ["kernel", "cubic_spline", "wendland_c2", "gauss"]),
-        ({"density": "continuity"}, ["density", "summation", "continuity"]),
+        ({"density": "guess"}, ["density", "summation", "continuity", "guess"]),
         ({"support_ratio": 5}, ["support_ratio", "less than or equal to 4", "5"]),
         ({"artificial_viscosity": -1}, ["artificial_viscosity", "greater than or equal to 0", "-1"]),
         ({"rest_density": 0}, ["rest_density", "greater than 0", "0"]),
@@ -373,12 +373,12 @@ def test_unknown_scene_lists_the_known_ones():
 def test_built_in_scenes_load_in_both_dimensions():
     required = "dam_break double_dam_break dam_break_drop serna_ablation martin_moyce still_pool free_fall"
     names = rts.scene_names()
-    drops = {"elliptical_drop", "oscillating_drop"}
-    assert set(required.split()) | drops | {"dam_break_2d", "double_dam_break_2d"} <= set(names)
+    flat = {"elliptical_drop", "oscillating_drop", "hydrostatic_column", "taylor_green", "poiseuille", "standing_wave"}
+    assert set(required.split()) | flat | {"dam_break_2d", "double_dam_break_2d"} <= set(names)
     for name in names:
         loaded = rts.load_scene(name)
         assert loaded.name == name
-        assert loaded.dim == (2 if name.endswith("_2d") or name in drops else 3)
+        assert loaded.dim == (2 if name.endswith("_2d") or name in flat else 3)
         assert loaded.description
 
 

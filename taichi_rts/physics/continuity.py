@@ -1,0 +1,139 @@
+"""Density integrated in time with the continuity equation, and the diffusion that keeps it smooth (delta-SPH)."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import taichi as ti
+
+from taichi_rts.backend import Backend
+from taichi_rts.grid import BlockGrid, make_neighbour_sum
+from taichi_rts.particles import Neighbourhood, Particles
+from taichi_rts.physics.medium import Medium
+from taichi_rts.physics.momentum import Pressure
+from taichi_rts.scene import Scene
+
+DELTA = 0.1
+"""Strength of the diffusion (Antuono, Colagrossi & Marrone 2012; Fourtakas et al. 2019)."""
+
+
+@ti.data_oriented
+class ContinuityDensity:
+    """d rho_i/dt = sum_j m v_ij . grad W_ij + sum_b rho_0 V_b v_ib . grad W_ib + D_i (Monaghan 1994; D_i: `DensityDiffusion`).
+
+    The step: rho' = rho + dt [sum_j m v_ij . grad W_ij] + dt D_i with the sum taken at the middle of the step, at the
+    positions and velocities that lead to the predicted ones: v - a dt/2 and x - v dt/2 + a dt^2/8. Then density follows
+    positions to second order, as a summed one does, and acoustic waves are stable up to the same step. (The rate at the end of
+    the predicted step, corrected like velocities, is the second Adams-Bashforth scheme for them, which is unstable without
+    viscosity.) D_i is that of the last evaluation; `Motion.advance_due` corrects it afterwards.
+    """
+
+    integrates = True
+    needs = frozenset({"rho_rate", "diffusion", "acceleration"})
+
+    def __init__(
+        self,
+        particles: Particles,
+        near: Neighbourhood,
+        grid: BlockGrid,
+        walls: Sequence[Any],
+        medium: Medium,
+        backend: Backend,
+    ) -> None:
+        self.particles = particles
+        self.near = near
+        self.grid = grid
+        self.walls = list(walls)
+        self.equation_of_state = medium.equation_of_state
+        self.keeps_past = particles.has_past
+        kernel, mass, rest_density = medium.kernel, medium.mass, medium.rest_density
+        geometry = grid.geometry
+        tiny = medium.tiny
+
+        @ti.func
+        def compression(x_ij, v_ij, a_ij, dt):
+            """V . grad W per unit of mass at the middle of a step of `dt` [s] that ends at x_ij, v_ij."""
+            v = v_ij - (0.5 * dt) * a_ij
+            x = x_ij - (0.5 * dt) * v - (0.125 * dt * dt) * a_ij
+            return ti.Vector([kernel.gradient_factor(ti.sqrt(x.norm_sqr() + tiny)) * v.dot(x)])
+
+        @ti.func
+        def fluid_pair(i, j):
+            x_ij = geometry.difference(near.x[i], near.x[j])
+            return mass * compression(x_ij, near.v[i] - near.v[j], near.a[i] - near.a[j], near.elapsed[i])
+
+        def wall_pair(wall: Any) -> Callable[..., Any]:
+            @ti.func
+            def pair(i, b):
+                x_ib, v_ib = wall.difference(i, b), wall.relative_velocity(i, b)
+                return rest_density * wall.volume[b] * compression(x_ib, v_ib, near.a[i], near.elapsed[i])
+
+            return pair
+
+        self.sum_fluid = make_neighbour_sum(geometry, grid.start, fluid_pair, 1, backend)
+        self.sum_walls = [make_neighbour_sum(geometry, wall.start, wall_pair(wall), 1, backend) for wall in self.walls]
+
+    @ti.kernel
+    def update(self, due: ti.template(), due_count: ti.template(), read_at: ti.template(), now: ti.i32, tick: float):
+        """Find density [kg/m^3] and p/rho^2 of the due particles, which stand at places `due[0 .. due_count]`."""
+        for n in range(due_count[None]):
+            k = due[n]
+            i = self.grid.order[k]
+            x, cell = self.near.x[k], self.grid.cell_of[i]
+            rate = self.sum_fluid(k, x, cell)
+            for w in ti.static(range(len(self.walls))):
+                y, there = self.walls[w].seen_from(k, cell)
+                if self.walls[w].near[self.grid.block_of(there)] == 1:
+                    rate += self.sum_walls[w](k, y, there)
+            before = self.particles.rho[i]
+            rho = before + self.near.elapsed[k] * (rate[0] + self.particles.diffusion[i])
+            if ti.static(self.keeps_past):
+                self.particles.past_rho[i] = before
+            self.near.rho[k] = rho
+            self.near.p_over_rho2[k] = self.equation_of_state.pressure(rho) / (rho * rho)
+            self.particles.rho[i] = rho
+
+
+@ti.data_oriented
+class MirroredPressure(Pressure):
+    """Pressure against walls that have the pressure of the particle they push, and below it that of the water between.
+
+    -sum_b rho_0 V_b (p_i/rho_i^2 + max(0, p_i/rho_i^2 - g . x_ib / rho_0)) grad W_ib: Adami et al. 2012, Eq. 27, with the
+    particle itself in place of the mean over the wall's neighbours, so that a wall needs no state. A summed density does not
+    bear it (see `Pressure`); an integrated one, which the diffusion damps, does: a column of water rests under its hydrostatic
+    pressure to 1-2 %, where the one-sided force leaves 10 % (docs/validation.md).
+    """
+
+    def __init__(self, near: Neighbourhood, scene: Scene) -> None:
+        super().__init__(near)
+        changes = bool(scene.gravity_changes)
+        self.slope = tuple(0.0 if changes else -g / scene.rest_density for g in scene.acceleration)
+
+    @ti.func
+    def wall_pair(self, i, b, x_ib, v_ib, d2, wall: ti.template()):
+        """Acceleration per unit of rho_0 V_b times the gradient factor."""
+        own = self.near.p_over_rho2[i]
+        return -(own + ti.max(own + ti.Vector(self.slope).dot(x_ib), 0.0)) * x_ib
+
+
+@ti.data_oriented
+class DensityDiffusion:
+    """D_i = 2 delta h c_s sum_j V_j psi_ij x_ij . grad W_ij / |x_ij|^2 with h = r/2 (Molteni & Colagrossi 2009).
+
+    psi_ij = rho_i - rho_j - rho_0 g . x_ij / c_s^2: what the densities differ by more than in water at rest, so that it comes
+    to rest under hydrostatic pressure (Fourtakas et al. 2019, Eq. 18, linearised). Where gravity changes, g is left out.
+    """
+
+    def __init__(self, near: Neighbourhood, medium: Medium, scene: Scene) -> None:
+        h = 0.5 * medium.support
+        self.near = near
+        self.factor = 2.0 * DELTA * h * medium.sound_speed
+        self.regular = 0.01 * h * h
+        stiffness = 0.0 if scene.gravity_changes else medium.rest_density / medium.sound_speed**2
+        self.hydrostatic = tuple(stiffness * g for g in scene.acceleration)
+        """Density gradient [kg/m^4] of water at rest, (dim,)."""
+
+    @ti.func
+    def fluid_pair(self, i, j, x_ij, d2):
+        """Rate [kg/(m^3 s)] per unit of m times the gradient factor."""
+        excess = self.near.rho[i] - self.near.rho[j] - ti.Vector(self.hydrostatic).dot(x_ij)
+        return self.factor * excess * d2 / (self.near.rho[j] * (d2 + self.regular))

@@ -1,0 +1,89 @@
+"""Faces of the domain that move as the scene prescribes: pistons."""
+
+import taichi as ti
+
+from taichi_rts.backend import Backend
+from taichi_rts.conditions import MovingWall, face_axis
+from taichi_rts.grid import Geometry
+from taichi_rts.particles import Neighbourhood
+from taichi_rts.physics.walls import Walls
+from taichi_rts.sampling import WallLayer
+
+
+@ti.data_oriented
+class MovingFace(Walls):
+    """Wall particles that move together, sorted once in their own frame; fluid is brought into that frame at its own time.
+
+    So readers at different times see the wall each at its own, and nothing has to be sorted again.
+    """
+
+    moves = True
+
+    def __init__(
+        self,
+        description: MovingWall,
+        layer: WallLayer,
+        fluid: Neighbourhood,
+        geometry: Geometry,
+        backend: Backend,
+    ) -> None:
+        super().__init__(layer, fluid, geometry, backend)
+        self.axis = face_axis(description.face)
+        self.at_lower = description.face[1] == "-"
+        self.face = (geometry.lower if self.at_lower else geometry.upper)[self.axis]
+        times, displacements, velocities = description.times, description.displacements, description.velocities
+        self.pieces = list(zip(times, times[1:], displacements, velocities, strict=False))
+        self.end = (times[-1], displacements[-1])
+        self.top_speed = max(map(abs, velocities))
+        self.shift = ti.field(backend.dtype, fluid.count)
+        """Displacement [m] of the frame at the time of the due particle at each place; `speed` [m/s] is its rate."""
+        self.speed = ti.field(backend.dtype, fluid.count)
+
+    @ti.func
+    def motion(self, time):
+        """Displacement [m] and velocity [m/s] along the axis at `time` [s]."""
+        displacement, velocity = 0.0, 0.0
+        for piece in ti.static(self.pieces):
+            if piece[0] <= time and time < piece[1]:
+                displacement, velocity = piece[2] + piece[3] * (time - piece[0]), piece[3]
+        if time >= self.end[0]:
+            displacement = self.end[1]
+        return displacement, velocity
+
+    @ti.func
+    def observe(self, k, time):
+        """Note where the wall is for the due particle at place `k`, which is at `time` [s]."""
+        self.shift[k], self.speed[k] = self.motion(time)
+
+    @ti.func
+    def seen_from(self, k, cell):
+        """Position [m] and cell, in the wall's frame, of the due particle at place `k`."""
+        x = self.fluid.x[k]
+        x[self.axis] -= self.shift[k]
+        x = self.geometry.place(x)
+        return x, self.geometry.cell(x)
+
+    @ti.func
+    def difference(self, k, b):
+        """x_k - x_b [m] between the due particle at place `k` and wall particle `b`."""
+        x = self.fluid.x[k]
+        x[self.axis] -= self.shift[k]
+        return self.geometry.difference(x, self.x[b])
+
+    @ti.func
+    def relative_velocity(self, k, b):
+        """v_k - v_b [m/s]."""
+        v = self.fluid.v[k]
+        v[self.axis] -= self.speed[k]
+        return v
+
+    @ti.func
+    def hold(self, x, time):
+        """Nearest point to `x` [m] that the face has not passed at `time` [s]."""
+        displacement, _velocity = self.motion(time)
+        y = x
+        if ti.static(self.at_lower):
+            y[self.axis] = ti.max(x[self.axis], self.face + displacement)
+        else:
+            y[self.axis] = ti.min(x[self.axis], self.face + displacement)
+        return y

@@ -1,0 +1,147 @@
+"""What can be wrong between fields of a scene that are each valid: every finding is one line with value, limit and remedy."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from taichi_rts.conditions import AXES, face_axis, face_position
+from taichi_rts.shapes import Block, Sphere, separation
+
+if TYPE_CHECKING:
+    from taichi_rts.scene import Scene
+
+
+def contradictions(scene: Scene) -> list[str]:
+    """Find what is wrong between fields that are each valid."""
+    faults = []
+    dim = scene.dim
+    if scene.gravity is not None and len(scene.gravity) != dim:
+        faults.append(f"gravity {scene.gravity} has {len(scene.gravity)} components; the domain has {dim}")
+    faults += _body_force_faults(scene) + _condition_faults(scene)
+    for k, fluid in enumerate(scene.fluids):
+        if len(fluid.lower) != dim:
+            faults.append(f"fluids.{k}: has {len(fluid.lower)} components; the domain has {dim}")
+            continue
+        faults += _fluid_faults(scene, k, fluid)
+        for other in range(k):
+            if len(scene.fluids[other].lower) == dim:
+                faults += _pair_faults(scene, k, other)
+    if not faults and scene.sound_speed is None and scene.estimate_max_speed() <= 0.0:
+        faults.append("sound_speed: nothing falls or moves at the start, so no default follows; give it a value [m/s]")
+    return faults
+
+
+def _body_force_faults(scene: Scene) -> list[str]:
+    force = scene.body_force
+    if force is None:
+        return []
+    faults = []
+    if force.dim != scene.dim:
+        faults.append(f"body_force: has {force.dim} components; the domain has {scene.dim}")
+    if not force.is_conservative:
+        faults.append(
+            f"body_force: gradient {force.gradient} is not symmetric, so it has no potential energy; "
+            "make gradient[d][e] equal gradient[e][d]"
+        )
+    if scene.sound_speed is None:
+        faults.append(
+            "sound_speed: how fast the body_force makes the fluid is not known, so no default follows; "
+            "give ten times the largest speed you expect [m/s]"
+        )
+    return faults
+
+
+def _condition_faults(scene: Scene) -> list[str]:
+    """Find what is wrong with periodic axes, moving walls, inflows and changes of gravity."""
+    faults = [
+        f"periodic: axis {axis!r} does not exist in two dimensions"
+        for axis in scene.periodic
+        if axis not in AXES[: scene.dim]
+    ]
+    for name, length, periodic in zip(AXES, scene.domain.size, scene.is_periodic, strict=False):
+        if not periodic:
+            continue
+        if length < 4.0 * scene.support:
+            faults.append(
+                f"periodic: the domain is {length:g} long along {name!r}; it must hold 4 support radii of {scene.support:g}; "
+                f"use a spacing of at most {length / (4.0 * scene.support_ratio):g}"
+            )
+        elif abs(length / scene.spacing - round(length / scene.spacing)) > 1e-3:
+            best = length / round(length / scene.spacing)
+            faults.append(
+                f"spacing: {scene.spacing} does not divide the periodic length {length:g} along {name!r}; use {best:.9g}"
+            )
+    for k, wall in enumerate(scene.moving_walls):
+        axis = face_axis(wall.face)
+        if axis >= scene.dim or scene.is_periodic[axis] or not scene.walls:
+            faults.append(f"moving_walls.{k}: the domain has no wall {wall.face!r}; choose another face")
+        elif max(map(abs, wall.displacements)) > scene.domain.size[axis] - scene.support:
+            faults.append(
+                f"moving_walls.{k}: {wall.face!r} would close the domain; leave at least {scene.support:g} [m]"
+            )
+    if len({wall.face for wall in scene.moving_walls}) < len(scene.moving_walls):
+        faults.append("moving_walls: two of them are the same face; join their times")
+    for k, inflow in enumerate(scene.inflows):
+        if len(inflow.lower) != scene.dim:
+            faults.append(f"inflows.{k}: has {len(inflow.lower)} components; the domain has {scene.dim}")
+            continue
+        place = inflow.lower[inflow.axis]
+        if scene.is_periodic[inflow.axis] or abs(place - face_position(inflow.face, scene.domain)) > _slack(scene):
+            faults.append(
+                f"inflows.{k}: the patch must lie on face {inflow.face!r} of the domain, where its velocity points inwards"
+            )
+        for d in range(scene.dim):
+            if d != inflow.axis and inflow.upper[d] - inflow.lower[d] < scene.spacing * (1 - 1e-6):
+                faults.append(f"inflows.{k}: the patch is narrower than the spacing {scene.spacing}; widen it")
+            if inflow.lower[d] < scene.domain.lower[d] - _slack(scene) or inflow.upper[d] > scene.domain.upper[
+                d
+            ] + _slack(scene):
+                faults.append(f"inflows.{k}: the patch leaves the domain; shrink it")
+    times = [change.time for change in scene.gravity_changes]
+    if times != sorted(set(times)):
+        faults.append(f"gravity_changes: times {times} must ascend")
+    for k, change in enumerate(scene.gravity_changes):
+        if len(change.gravity) != scene.dim:
+            faults.append(
+                f"gravity_changes.{k}: gravity has {len(change.gravity)} components; the domain has {scene.dim}"
+            )
+    return faults
+
+
+def _fluid_faults(scene: Scene, k: int, fluid: Block | Sphere) -> list[str]:
+    faults = []
+    slack = _slack(scene)
+    low = all(a >= b - slack for a, b in zip(fluid.lower, scene.domain.lower, strict=True))
+    high = all(a <= b + slack for a, b in zip(fluid.upper, scene.domain.upper, strict=True))
+    if not (low and high):
+        faults.append(
+            f"fluids.{k}: {fluid.outline} leaves the domain from "
+            f"{scene.domain.lower} to {scene.domain.upper}; move or shrink it, or enlarge the domain"
+        )
+    if isinstance(fluid, Sphere):
+        name, least = "radius", fluid.radius
+    else:
+        name, least = "shortest edge", min(b - a for a, b in zip(fluid.lower, fluid.upper, strict=True))
+    if least < scene.spacing * (1 - 1e-6):
+        faults.append(f"spacing: {scene.spacing} exceeds the {name} {least:g} of fluids.{k}; use at most {least:g}")
+    return faults
+
+
+def _pair_faults(scene: Scene, k: int, other: int) -> list[str]:
+    one, two = scene.fluids[k], scene.fluids[other]
+    gap = separation(one, two)
+    slack = _slack(scene)
+    if gap < -slack:
+        return [f"fluids.{k}: overlaps fluids.{other}; move one of them"]
+    # A sphere's particles may lie on its surface, a block's stay half a spacing inside: only two spheres' can coincide.
+    both_round = isinstance(one, Sphere) and isinstance(two, Sphere)
+    if both_round and gap < 0.5 * scene.spacing - slack:
+        return [
+            f"fluids.{k}: lies {max(gap, 0.0):g} from fluids.{other}, nearer than half a spacing {0.5 * scene.spacing:g}, "
+            "so that particles could coincide; move one of them or use a smaller spacing"
+        ]
+    return []
+
+
+def _slack(scene: Scene) -> float:
+    return 1e-9 * max(scene.domain.size)  # for lengths [m] that rounding blurs
