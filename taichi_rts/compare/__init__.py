@@ -1,0 +1,1 @@
+"""Speed against error: which stepper, at which step, is worth it on a scene."""
