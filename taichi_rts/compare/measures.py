@@ -1,7 +1,7 @@
 """What a run is judged by: every error is one number, computed in NumPy from two trajectories of the same particles.
 
-Particles are matched by id; where their number grows during a run, the ids that both runs have are compared. Every error is a root
-mean square over the sample times, so that a single moment does not decide. `docs/compare.md` repeats these definitions.
+Particles are matched by id; where their number grows during a run, the ids that both runs have are compared. Every error is
+a root mean square over the sample times, so that a single moment does not decide. `docs/compare.md` repeats these definitions.
 """
 
 from __future__ import annotations
@@ -86,7 +86,9 @@ def differences(one: np.ndarray, two: np.ndarray, periods: np.ndarray) -> np.nda
     """Differences of positions [m] of the ids that both have, (N, dim), to the nearest image across periodic faces."""
     n = min(len(one), len(two))
     gap = one[:n].astype(np.float64) - two[:n]
-    return np.where(np.isfinite(periods), gap - periods * np.round(gap / periods), gap)
+    wrapped = np.isfinite(periods)
+    gap[:, wrapped] -= periods[wrapped] * np.round(gap[:, wrapped] / periods[wrapped])
+    return gap
 
 
 def velocity_gap(run: Trajectory, reference: Trajectory, k: int) -> float:
@@ -129,11 +131,15 @@ def positions(run: Trajectory, reference: Trajectory, scale: Yardstick, together
     return _rms([position_gap(run, reference, k, scale.periods) for k in range(1, together + 1)])
 
 
+def front_position(run: Trajectory, k: int) -> float:
+    """Front of the fluid [m] at sample k: its fifth-largest x."""
+    x = run.positions[k][:, 0]
+    return float(np.partition(x, -FRONT_RANK)[-FRONT_RANK]) if len(x) >= FRONT_RANK else float(x.max())
+
+
 def front(run: Trajectory, reference: Trajectory, scale: Yardstick, together: int) -> float | None:
     """Difference of the fronts (fifth-largest x of the fluid) over the fluid's length, rms over the whole run."""
-    return _curve(
-        run, reference, lambda r, k: np.sort(r.positions[k][:, 0])[-min(FRONT_RANK, len(r.positions[k]))], scale.length
-    )
+    return _curve(run, reference, front_position, scale.length)
 
 
 def centre_of_mass(run: Trajectory, reference: Trajectory, scale: Yardstick, together: int) -> float | None:

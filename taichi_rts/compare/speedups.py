@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -46,7 +47,7 @@ def cost_at(points: Sequence[Point], error: float) -> tuple[float | None, bool]:
         return None, False
     if error > front[0][1] * (1.0 + 1e-12):
         return front[0][0], True
-    for (cheap, large), (dear, small) in zip(front, front[1:], strict=False):
+    for (cheap, large), (dear, small) in itertools.pairwise(front):
         if small <= error <= large:
             share = math.log(large / error) / math.log(large / small)
             return cheap * (dear / cheap) ** share, False

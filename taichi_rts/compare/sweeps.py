@@ -105,7 +105,7 @@ def for_scene(sweeps: Sequence[Sweep], steppers: Sequence[str]) -> list[dict[str
 
 
 def check(sweeps: Sequence[Sweep], steppers: Sequence[str]) -> None:
-    """Raise `Error` for a sweep that would change nothing, because its stepper is not among those compared, or that comes twice."""
+    """Raise `Error` for a sweep that would change nothing, its stepper not being compared, or that comes twice."""
     seen: set[tuple[str | None, str]] = set()
     for sweep in sweeps:
         if (sweep.target, sweep.key) in seen:
