@@ -59,14 +59,19 @@ def _leave_interrupts_to_parent() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
+def require_dask() -> None:
+    """Raise `Error` if the extra is not installed, before any work is done."""
+    if importlib.util.find_spec("distributed") is None:
+        raise Error("--dask needs the package distributed; run: pip install 'taichi_rts[cluster]'")
+
+
 @contextmanager
 def dask(address: str, workers: int = 1) -> Iterator[Any]:
     """Connect to the Dask scheduler at `address`, or start a `local` cluster of `workers` processes with one task each.
 
     Raises `Error` if the package is missing or nobody answers.
     """
-    if importlib.util.find_spec("distributed") is None:
-        raise Error("--dask needs the package distributed; run: pip install 'taichi_rts[cluster]'")
+    require_dask()
     from distributed import Client, LocalCluster
 
     if address == "local":

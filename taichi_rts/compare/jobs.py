@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from taichi_rts.compare.trajectory import Trajectory
 from taichi_rts.diagnostics import speedup_bound
 from taichi_rts.scene import scene_from
 from taichi_rts.stability.survival import largest_stable, watch
+from taichi_rts.stepping.base import Stepper
 
 STEPPERS: dict[str, Any] = {kind.name: kind for kind in (rts.Uniform, rts.Regional, rts.Asynchronous)}
 NEIGHBOUR_SAMPLES = 5
@@ -143,7 +144,7 @@ def find_largest_stable(job: Job) -> dict[str, Any]:
     """Find the largest Courant number at which uniform steps survive the job's scene: `stable`, `unstable`, `reason`."""
     bracket = largest_stable(
         scene_from(job.scene),
-        lambda courant: rts.Uniform(courant=courant),
+        lambda courant: cast(Stepper, rts.Uniform(courant=courant)),
         fresh=lambda: rts.init(job.arch, job.precision),
     )
     return {"stable": bracket.stable, "unstable": bracket.unstable, "reason": bracket.reason}

@@ -121,6 +121,7 @@ class _Comparison:
             known = {v.courant for v in variants if v.scene == number and v.family == "uniform" and not v.options}
             if found["stable"] is not None and found["stable"] not in known:
                 variants.append(uniform_variant(number, found["stable"], self.scenes[number][1], LARGEST_STABLE))
+        variants.sort(key=lambda v: (v.scene, v.family != "uniform"))
         return {
             "scenes": [ground.facts() for ground in grounds],
             "largest_stable": stable,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 Point = tuple[float, float]
@@ -66,7 +66,7 @@ def ladder(low: float, high: float) -> list[float]:
     return [10.0 ** (k / 3.0) for k in range(last, first - 1, -1)]
 
 
-def fastest_at(curves: dict[str, Sequence[Point]], error: float) -> tuple[str, float] | None:
+def fastest_at(curves: Mapping[str, Sequence[Point]], error: float) -> tuple[str, float] | None:
     """Name and cost of the curve that reaches `error` at the least cost; None if none does."""
     costs = {name: cost for name, points in curves.items() if (cost := cost_at(points, error)[0]) is not None}
     if not costs:

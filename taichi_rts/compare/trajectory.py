@@ -53,6 +53,6 @@ class Trajectory:
         """Read what `to_bytes` wrote; raises `ValueError`, `KeyError`, `OSError` or `BadZipFile` if it did not."""
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
             ends = np.cumsum(file["counts"])[:-1]
-            arrays = [list(np.split(file[name], ends)) for name in ("positions", "velocities", "densities")]
+            x, v, rho = (list(np.split(file[name], ends)) for name in ("positions", "velocities", "densities"))
             energies = [tuple(float(part) for part in row) for row in file["energies"]]
-            return cls([float(time) for time in file["times"]], *arrays, energies)
+            return cls([float(time) for time in file["times"]], x, v, rho, energies)
