@@ -86,12 +86,12 @@ def speedups(
 def series_points(
     runs: Sequence[dict[str, Any]], error: str, cost: str
 ) -> dict[str, list[tuple[Point, dict[str, Any]]]]:
-    """Return for every series its points and runs, by rising cost."""
+    """Return for every series its points and runs, by falling Courant number."""
     found: dict[str, list[tuple[Point, dict[str, Any]]]] = {}
     for run in runs:
         if place := point(run, error, cost):
             found.setdefault(run["series"], []).append((place, run))
-    return {name: sorted(items, key=lambda item: item[0]) for name, items in found.items()}
+    return {name: sorted(items, key=lambda item: -item[1]["courant"]) for name, items in found.items()}
 
 
 def verdict(report: dict[str, Any], number: int) -> list[str]:
