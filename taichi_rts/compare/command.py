@@ -16,13 +16,14 @@ import tyro
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 import taichi_rts as rts
-from taichi_rts.compare import analysis, executors, folder, plot, sweeps, table
+from taichi_rts.compare import analysis, executors, folder, plot, references, sweeps, table
+from taichi_rts.compare.measures import PARTED
 from taichi_rts.compare.runner import COURANTS, Settings, compare, plan
 from taichi_rts.errors import Error
 from taichi_rts.report import console
 from taichi_rts.scene import Scene
 
-DEFAULT_PARTICLES = {2: 600, 3: 1500}
+DEFAULT_PARTICLES = {2: 500, 3: 1000}
 """By dimension: what a comparison with the default sweep does in about five minutes on two cores."""
 ErrorName = Literal[
     "velocities",
@@ -66,11 +67,13 @@ class Compare:
     spacing: float | None = None
     """Initial particle spacing [m]."""
     particles: str | None = None
-    """Number of fluid particles instead of a spacing; by default 600 in two dimensions, 1500 in three."""
+    """Number of fluid particles instead of a spacing; by default 500 in two dimensions, 1000 in three."""
     end_time: float | None = None
     """Physical time to run to [s]; by default the scene's own."""
     samples: int = 40
     """At how many equal intervals runs are compared."""
+    parted: float = PARTED
+    """Relative L2 difference of velocities above which the two references have parted: matched errors are taken up to then."""
     repeats: int = 3
     """How many times each run is timed; the median counts."""
     output_dir: Path | None = None
@@ -96,6 +99,7 @@ class Compare:
         _, variants = plan(scene, settings)  # what cannot be built is said before anything runs or is written
         where = self.output_dir if self.output_dir is not None else Path("out") / "compare" / scene.name
         executor = self.executor()
+        references.prepare_cache(settings.cache or references.default_cache())
         folder.prepare(where, resume=self.resume, overwrite=self.overwrite)
         self.announce(scene, settings, len(variants))
         try:
@@ -136,7 +140,7 @@ class Compare:
         courants = sweeps.numbers(self.courants, "--courants")
         return Settings(
             steppers=tuple(steppers), courants=tuple(courants), sets=tuple(sets), samples=self.samples,
-            repeats=self.repeats, arch=self.arch, precision=self.precision, cache=self.cache_dir,
+            repeats=self.repeats, parted=self.parted, arch=self.arch, precision=self.precision, cache=self.cache_dir,
         )  # fmt: skip
 
     def executor(self) -> AbstractContextManager[Any]:

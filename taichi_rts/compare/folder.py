@@ -25,7 +25,7 @@ def prepare(folder: Path, *, resume: bool = False, overwrite: bool = False) -> N
         raise OutputError("--resume keeps the runs in the folder and --overwrite removes them; give one of the two")
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"{folder} is a file, and a folder is needed; choose another --output-dir")
-    found = [name for name in ARTEFACTS if (folder / name).exists()]
+    found = [name for name in ARTEFACTS if _holds_something(folder / name)]
     if found and not (resume or overwrite):
         raise OutputError(
             f"{folder} already holds a comparison ({', '.join(found)}); give --resume to go on with it, --overwrite to "
@@ -41,7 +41,14 @@ def prepare(folder: Path, *, resume: bool = False, overwrite: bool = False) -> N
                 shutil.rmtree(target)
             else:
                 target.unlink()
-    (folder / "runs").mkdir(parents=True, exist_ok=True)
+    try:
+        (folder / "runs").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder} cannot be made: {error.strerror}; choose another --output-dir") from None
+
+
+def _holds_something(path: Path) -> bool:
+    return any(path.iterdir()) if path.is_dir() else path.exists()
 
 
 def write(folder: Path, report: Mapping[str, Any], *, with_plot: bool = True) -> list[Path]:

@@ -24,6 +24,7 @@ class Ground:
     scale: Yardstick
     courant: float
     cached: bool
+    threshold: float
 
     def facts(self) -> dict[str, Any]:
         """Return what the report says about it."""
@@ -35,6 +36,7 @@ class Ground:
             "reference_courant": self.courant,
             "reference_keys": list(self.keys),
             "reference_cached": self.cached,
+            "parting_threshold": self.threshold,
             "parting_time": times[self.together],
             "parted": self.together < len(times) - 1,
             "floor": finite(judge(self.coarser, self.reference, self.scale, self.together)),

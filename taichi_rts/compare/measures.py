@@ -18,7 +18,7 @@ from taichi_rts.sampling import calibrate_mass
 from taichi_rts.scene import Scene
 
 PARTED = 0.01
-"""Two runs have parted when the relative L2 difference of their velocities exceeds this."""
+"""Two runs have parted when the relative L2 difference of their velocities exceeds this, by default."""
 FRONT_RANK = 5
 """The front is the FRONT_RANK-th largest x, so that single drops that fly ahead do not count."""
 
@@ -110,10 +110,10 @@ def position_gap(run: Trajectory, reference: Trajectory, k: int, periods: np.nda
     return _over(np.linalg.norm(gap), np.linalg.norm(moved))
 
 
-def parting(one: Trajectory, two: Trajectory) -> int:
-    """Number of samples after the start before two runs part (`PARTED`): 0 where they part at once."""
+def parting(one: Trajectory, two: Trajectory, threshold: float = PARTED) -> int:
+    """Number of samples after the start before `velocity_gap` of two runs exceeds `threshold`: 0 where it does at once."""
     for k in range(1, len(two.times)):
-        if not velocity_gap(one, two, k) <= PARTED:
+        if not velocity_gap(one, two, k) <= threshold:
             return k - 1
     return len(two.times) - 1
 

@@ -43,6 +43,8 @@ def draw(report: Mapping[str, Any]) -> bytes:
 
 
 def _panel(axes: Any, report: Mapping[str, Any], number: int, series: Sequence[str]) -> None:
+    from matplotlib.ticker import LogFormatter
+
     error, cost = report["judged_by"], report["cost"]
     ground = report["scenes"][number]
     runs = [run for run in report["variants"] if run["scene"] == number]
@@ -90,6 +92,9 @@ def _panel(axes: Any, report: Mapping[str, Any], number: int, series: Sequence[s
     axes.grid(which="minor", color="#EEEEEE", linewidth=0.5)
     axes.set_axisbelow(True)
     axes.set_xlabel(AXES[cost])
+    if cost == "wall":
+        for ticks in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
+            ticks(LogFormatter(labelOnlyBase=False, minor_thresholds=(2, 0.5)))
     until = f", rms to t = {ground['parting_time']:.3g} s" if error in ("velocities", "positions") else ""
     axes.set_ylabel(f"error in {error.replace('_', ' ')}{until}")
     title = " ".join(part for part in (ground["scene"]["name"], describe(ground["changes"])) if part)

@@ -12,7 +12,7 @@ from taichi_rts.compare import references, sweeps
 from taichi_rts.compare.executors import Task, collect, processes
 from taichi_rts.compare.grounds import Ground, curves, finite
 from taichi_rts.compare.jobs import Job, Outcome, find_largest_stable, run, stepper_from
-from taichi_rts.compare.measures import ERRORS, Yardstick, judge, parting
+from taichi_rts.compare.measures import ERRORS, PARTED, Yardstick, judge, parting
 from taichi_rts.compare.variants import LARGEST_STABLE, Variant, make_variants, smallest_step, uniform_variant
 from taichi_rts.errors import Error
 from taichi_rts.output.files import write_json
@@ -35,6 +35,7 @@ class Settings:
         sets: sweeps of other parameters, each "KEY=VALUE,VALUE".
         samples: number of equal intervals at whose ends runs are compared.
         repeats: how many times each run is timed.
+        parted: relative L2 difference of velocities above which the two references have parted.
         arch, precision: what the variants run on; references are in double precision on the CPU.
         cache: folder of the references; None: `references.default_cache`.
     """
@@ -44,6 +45,7 @@ class Settings:
     sets: tuple[str, ...] = ()
     samples: int = 40
     repeats: int = 3
+    parted: float = PARTED
     arch: str = "cpu"
     precision: str = "f32"
     cache: Path | None = None
@@ -88,8 +90,11 @@ def plan(scene: Scene, settings: Settings) -> tuple[list[tuple[Scene, dict[str, 
     """Return the scenes, each with what was changed in it, and the variants; raises `Error` for what cannot be built."""
     sets = [sweeps.parse_sweep(text) for text in settings.sets]
     sweeps.check(sets, settings.steppers)
-    if settings.samples < 2 or settings.repeats < 1:
-        raise Error(f"samples {settings.samples} and repeats {settings.repeats}: at least 2 and 1 are needed")
+    if settings.samples < 2 or settings.repeats < 1 or not settings.parted > 0.0:
+        raise Error(
+            f"samples {settings.samples}, repeats {settings.repeats}, parted {settings.parted:g}: at least 2, at least 1 and "
+            "above 0 are needed; try 40, 3 and 0.01"
+        )
     changes = sweeps.for_scene(sets, settings.steppers)
     scenes = list(zip(sweeps.scenes_of(scene, changes), changes, strict=True))
     return scenes, make_variants(scenes, settings.steppers, settings.courants, sets)
@@ -183,16 +188,32 @@ class _Comparison:
             for k in set(range(2)) - set(missing):
                 self.progress.advance(weight(jobs[k]))
             reference, coarser = (each for key in keys if (each := found[key]) is not None)
-            together = parting(coarser, reference)
+            together = parting(coarser, reference, self.settings.parted)
             scale = Yardstick.of(scene, reference)
             courant = jobs[0].stepper["courant"]
-            grounds.append(Ground(scene, changes, keys, reference, coarser, together, scale, courant, not missing))
+            grounds.append(
+                Ground(
+                    scene,
+                    changes,
+                    keys,
+                    reference,
+                    coarser,
+                    together,
+                    scale,
+                    courant,
+                    not missing,
+                    self.settings.parted,
+                )
+            )
         return grounds
 
     def make_runs(self, variants: Sequence[Variant], grounds: Sequence[Ground]) -> list[dict[str, Any]]:
         """Run what is not stored yet, and judge it."""
         jobs = [self.job(variant) for variant in variants]
-        keys = [references.job_key(job, *grounds[v.scene].keys) for job, v in zip(jobs, variants, strict=True)]
+        keys = [
+            references.job_key(job, str(self.settings.parted), *grounds[v.scene].keys)
+            for job, v in zip(jobs, variants, strict=True)
+        ]
         tasks = [Task(v.label, weight(job), run, job) for job, v in zip(jobs, variants, strict=True)]
 
         def judged(number: int, out: Outcome) -> dict[str, Any]:

@@ -52,7 +52,11 @@ def parse_sweep(text: str) -> Sweep:
     known = known_keys(target) if dot else sorted({key for name in targets for key in known_keys(name)})
     if key not in known:
         raise Error(f"--set {text!r}: {key!r} is {_unknown(key, known)}")
-    return Sweep(target if dot else None, key, tuple(parse_scalar(each) for each in split_values(values)))
+    found: list[Any] = []
+    for each in map(parse_scalar, split_values(values)):
+        if not any(each == other and type(each) is type(other) for other in found):
+            found.append(each)
+    return Sweep(target if dot else None, key, tuple(found))
 
 
 def known_keys(target: str) -> list[str]:

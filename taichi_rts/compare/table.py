@@ -9,7 +9,7 @@ from typing import Any
 
 from rich.table import Table
 
-from taichi_rts.compare.measures import ERRORS, MATCHED, PARTED
+from taichi_rts.compare.measures import ERRORS, MATCHED
 from taichi_rts.compare.sweeps import describe
 from taichi_rts.compare.variants import BASE_STEP, LARGEST_STABLE, SWEEP
 
@@ -24,52 +24,52 @@ COLUMNS = (
 SPEEDUPS = ("equal_step", "largest_stable", "equal_error", "equal_error_is_bound", "bound")
 
 
+SPREAD = 1.3
+"""Slowest over fastest repeat of a run above which wall times are called doubtful."""
 ROLES = {SWEEP: "", BASE_STEP: " (dt_b)", LARGEST_STABLE: " (stable)"}
 
 
 def make_tables(report: Mapping[str, Any], number: int) -> list[Table]:
-    """Return the tables of one scene: costs and errors of every run, and the speed-ups of those that are not uniform."""
+    """Return the tables of one scene: what each run costs, and its errors and speed-ups; neither wider than 80 columns."""
     ground, error = report["scenes"][number], report["judged_by"]
     runs = [run for run in report["variants"] if run["scene"] == number]
     title = " ".join(part for part in (ground["scene"]["name"], describe(ground["changes"])) if part)
+    costs = _table(f"{title}, {ground['particles']:,} particles: costs", "wall [s]", "updates", "pairs", "steps", "MiB")
     shown = list(dict.fromkeys([error, "front"]))
-    table = Table(title=f"{title}: {ground['particles']:,} particles", title_justify="left")
-    table.add_column("run", no_wrap=True)
-    for heading in ("wall [s]", "updates", "pairs", "steps", "MiB", *(name.replace("_", " ") for name in shown)):
-        table.add_column(heading, justify="right")
+    names = (name.replace("_", " ") for name in shown)
+    gains = _table(
+        f"Errors, and {report['cost']} of uniform steps over a run's", *names, "= step", "stable", "= error", "bound"
+    )
     for run in runs:
-        table.add_row(*_row(run, shown), style="bold" if run["pareto"] else None)
-    table.add_section()
-    table.add_row("reference's own error", *[""] * 5, *(_error(ground["floor"][name]) for name in shown), style="dim")
-
-    gains = Table(title=f"{report['cost']} of uniform steps over that of the run", title_justify="left")
-    gains.add_column("run", no_wrap=True)
-    for heading in ("at equal step", "at largest stable step", "at equal error", "bound at equal step"):
-        gains.add_column(heading, justify="right")
-    for run in runs:
-        if run["speedups"] is not None:
-            gains.add_row(run["label"], *_gains(run["speedups"]))
-    return [table, gains] if gains.row_count else [table]
+        name, style = f"{run['label']}{ROLES[run['role']]}", "bold" if run["pareto"] else None
+        if run["survived"]:
+            costs.add_row(name, *_costs(run["costs"]), style=style)
+            gains.add_row(name, *(_error(run["errors"][key]) for key in shown), *_gains(run["speedups"]), style=style)
+        else:
+            costs.add_row(name, "[red]failed[/]")
+            gains.add_row(name, "[red]failed[/]")
+    gains.add_section()
+    gains.add_row("reference's own error", *(_error(ground["floor"][name]) for name in shown), style="dim")
+    return [costs, gains]
 
 
-def _row(run: Mapping[str, Any], shown: list[str]) -> list[str]:
-    name = f"{run['label']}{ROLES[run['role']]}"
-    if not run["survived"]:
-        return [name, "[red]failed[/]"]
-    costs = run["costs"]
-    return [
-        name,
-        f"{costs['wall_seconds']:.3g}",
-        _short(costs["particle_updates"]),
-        _short(costs["pair_interactions"]),
-        f"{costs['base_steps']:,}",
-        f"{costs['peak_memory_bytes'] / 2**20:.0f}",
-        *(_error(run["errors"][name]) for name in shown),
-    ]
+def _table(title: str, *headings: str) -> Table:
+    table = Table(title=title, title_justify="left")
+    table.add_column("run")
+    for heading in headings:
+        table.add_column(heading, justify="right", no_wrap=True)
+    return table
 
 
-def _gains(gains: Mapping[str, Any]) -> list[str]:
-    equal = "not reached" if gains["equal_error"] is None else _gain(gains["equal_error"])
+def _costs(costs: Mapping[str, Any]) -> list[str]:
+    counts = (_short(costs["particle_updates"]), _short(costs["pair_interactions"]), f"{costs['base_steps']:,}")
+    return [f"{costs['wall_seconds']:.3g}", *counts, f"{costs['peak_memory_bytes'] / 2**20:.0f}"]
+
+
+def _gains(gains: Mapping[str, Any] | None) -> list[str]:
+    if gains is None:
+        return []
+    equal = "-" if gains["equal_error"] is None else _gain(gains["equal_error"])
     star = "*" if gains["equal_error_is_bound"] else ""
     return [_gain(gains["equal_step"]), _gain(gains["largest_stable"]), equal + star, _gain(gains["bound"])]
 
@@ -89,10 +89,36 @@ def notes(report: Mapping[str, Any], number: int) -> list[str]:
             f"at {stable['unstable']:.4g}: {stable['reason']}" if stable["unstable"] else "larger ones were not tried"
         )
         largest = f"Largest stable uniform step: λ={stable['stable']:.4g} ({beyond})."
+    columns = (
+        "Speed-ups over uniform steps: = step, of its base step dt_b (asynchronous: of its longest); stable, of the largest that "
+        "survives; = error, of the best at this error (- where none is so accurate); bound, the most that = step could be."
+    )
     marked = any((run["speedups"] or {}).get("equal_error_is_bound") for run in report["variants"])
     star = ["* Even the cheapest uniform run is more accurate than this one, and is taken as it is."] if marked else []
     bold = f"Bold: no other run is both cheaper ({report['cost']}) and more accurate ({report['judged_by']})."
-    return [bold, *star, *failed, largest, parting_sentence(ground)]
+    return [bold, columns, *star, *failed, largest, parting_sentence(ground), *_doubts(report, number)]
+
+
+def _doubts(report: Mapping[str, Any], number: int) -> list[str]:
+    """Say how far the reference is below the runs, and whether wall times can be trusted."""
+    error, ground = report["judged_by"], report["scenes"][number]
+    runs = [run for run in report["variants"] if run["scene"] == number and run["survived"]]
+    errors = [run["errors"][error] for run in runs if run["errors"][error]]
+    floor, lines = ground["floor"][error], []
+    if floor and errors:
+        ratio = min(errors) / floor
+        close = "; errors up to twice the reference's own say nothing" if ratio < 2.0 else ""
+        lines.append(
+            f"Reference: uniform λ={ground['reference_courant']:.3g} in double precision, whose own error in {error}, "
+            f"{floor:.2g}, is {ratio:.3g} times smaller than the smallest here{close}."
+        )
+    spreads = [max(each) / min(each) for run in runs if min(each := run["costs"]["wall_seconds_all"]) > 0.0]
+    if spreads and max(spreads) > SPREAD:
+        lines.append(
+            f"Wall times of the same run differ by up to {max(spreads) - 1.0:.0%}: the machine is busy or the runs are short; "
+            "repeat it when idle, or judge by --cost updates."
+        )
+    return lines
 
 
 def parting_sentence(ground: Mapping[str, Any]) -> str:
@@ -102,7 +128,8 @@ def parting_sentence(ground: Mapping[str, Any]) -> str:
     if not ground["parted"]:
         return f"The references stay together to the end, t_p = {time:.4g} s: {names} are compared over the whole run."
     return (
-        f"The two references part after t_p = {time:.4g} s (velocities differ by more than {PARTED:.0%} at the next sample): "
+        f"The two references part after t_p = {time:.4g} s (at the next sample velocities differ by more than "
+        f"{ground['parting_threshold']:.3g}): "
         f"{names} are compared up to then, all else over the whole run."
     )
 
@@ -136,5 +163,5 @@ def _gain(value: float | None) -> str:
 def _short(count: float) -> str:
     for factor, unit in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
         if count >= factor:
-            return f"{count / factor:.3g} {unit}"
+            return f"{count / factor:.3g}{unit}"
     return f"{count:.0f}"

@@ -2,6 +2,7 @@ import csv
 import io
 
 import pytest
+from rich.console import Console
 
 from taichi_rts.compare import analysis, plot, table
 from taichi_rts.compare.measures import ERRORS
@@ -9,7 +10,12 @@ from taichi_rts.compare.measures import ERRORS
 
 def make_run(family, courant, wall, error, **more):
     costs = {"wall_seconds": wall, "particle_updates": 1000 * wall, "speedup_bound": 1.6, "pair_interactions": 1e5}
-    costs |= {"base_steps": 10, "peak_memory_bytes": 2**27, "active_fraction": 0.5}
+    costs |= {
+        "base_steps": 10,
+        "peak_memory_bytes": 2**27,
+        "active_fraction": 0.5,
+        "wall_seconds_all": [wall, 1.1 * wall],
+    }
     errors = dict.fromkeys(ERRORS, 0.5) | {"velocities": error}
     label = f"{family} λ={courant:g}"
     stepper = {"levels": 8}
@@ -27,6 +33,7 @@ def make_report(*others, together=0.3):
         make_run("uniform", 0.8, 1.0, 1e-1),
     ]
     ground = {"scene": {"name": "pond"}, "changes": {}, "particles": 100, "parting_time": together, "parted": True}
+    ground |= {"parting_threshold": 0.01, "reference_courant": 0.025}
     ground["floor"] = dict.fromkeys(ERRORS, 1e-5)
     stable = {"stable": 0.8, "unstable": 0.84, "reason": "energy"}
     return {"scenes": [ground], "largest_stable": [stable], "variants": [*uniform, *others]}
@@ -103,3 +110,25 @@ def test_the_plot_is_a_picture():
     dead = make_run("paper", 0.8, 0.1, None, survived=False, reason="blown up", costs={}, errors={})
     report, _ = judged(make_run("regional", 0.4, 0.5, 4e-3), dead)
     assert plot.draw(report)[:4] == b"\x89PNG"
+
+
+def test_doubts_are_told():
+    report, _ = judged()
+    notes = " ".join(table.notes(report, 0))
+    assert "1e-05, is 100 times smaller than the smallest here." in notes
+    assert "busy" not in notes
+    report["variants"][0]["costs"]["wall_seconds_all"] = [1.0, 1.5]
+    report["scenes"][0]["floor"]["velocities"] = 6e-4
+    notes = " ".join(table.notes(report, 0))
+    assert "differ by up to 50%" in notes
+    assert "1.67 times smaller than the smallest here; errors up to twice" in notes
+
+
+def test_tables_fit_eighty_columns():
+    report, _ = judged(make_run("asynchronous", 0.2, 5.0, 1e-4), make_run("paper", 0.4, 2.0, 0.2))
+    for each in table.make_tables(report, 0):
+        console = Console(width=80, record=True, file=io.StringIO())
+        console.print(each)
+        lines = console.export_text().splitlines()
+        assert not any("…" in line for line in lines)
+        assert any("asynchronous λ=0.2" in line for line in lines)
