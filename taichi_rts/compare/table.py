@@ -41,15 +41,15 @@ def make_tables(report: Mapping[str, Any], number: int) -> list[Table]:
         f"Errors, and {report['cost']} of uniform steps over a run's", *names, "= step", "stable", "= error", "bound"
     )
     for run in runs:
-        name, style = f"{run['label']}{ROLES[run['role']]}", "bold" if run["pareto"] else None
+        name, style = run["label"], "bold" if run["pareto"] else None
         if run["survived"]:
-            costs.add_row(name, *_costs(run["costs"]), style=style)
+            costs.add_row(name + ROLES[run["role"]], *_costs(run["costs"]), style=style)
             gains.add_row(name, *(_error(run["errors"][key]) for key in shown), *_gains(run["speedups"]), style=style)
         else:
-            costs.add_row(name, "[red]failed[/]")
+            costs.add_row(name + ROLES[run["role"]], "[red]failed[/]")
             gains.add_row(name, "[red]failed[/]")
     gains.add_section()
-    gains.add_row("reference's own error", *(_error(ground["floor"][name]) for name in shown), style="dim")
+    gains.add_row("(reference itself)", *(_error(ground["floor"][name]) for name in shown), style="dim")
     return [costs, gains]
 
 
