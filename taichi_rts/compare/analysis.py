@@ -11,6 +11,8 @@ from taichi_rts.compare.sweeps import describe
 
 COSTS = {"wall": "wall_seconds", "updates": "particle_updates"}
 """What a run can cost, by the name on the command line."""
+TIE = 1.05
+"""A gain less than this is called none: wall times repeat to a few percent."""
 RELIABLE = 2.0
 """An error less than this many times the floor says more about the reference than about the run."""
 
@@ -106,7 +108,7 @@ def verdict(report: dict[str, Any], number: int) -> list[str]:
     errors = [place[1] for points in curves.values() for place in points]
     steps = [(each, fastest_at(curves, each)) for each in ladder(min(errors), max(errors)) or [max(errors)]]
     unit = "s" if cost == "wall" else "updates"
-    ranks = "; ".join(f"{each:.2g}: {found[0]} ({found[1]:.3g} {unit})" for each, found in steps if found)
+    ranks = "; ".join(f"{each:.2g}: {found[0]} ({_amount(found[1])} {unit})" for each, found in steps if found)
     return [
         f"{title}fastest at each error in {error}: {ranks}",
         title + gain_sentence(runs, error, cost, ground["floor"][error]),
@@ -139,8 +141,12 @@ def gain_sentence(runs: Sequence[dict[str, Any]], error: str, cost: str, floor: 
         if floor and min(each[1] for each in [*uniform, *(_point(r, error, cost) for r in others)]) < RELIABLE * floor
         else ""
     )
-    if gain > 1.0:
+    if gain > TIE:
         text = f"Yes: at equal error ({own:.2g}) {run['label']} is {gain:.2f} times as cheap as {how}, by {word}."
+    elif gain > 1.0 / TIE:
+        text = (
+            f"No gain: at equal error ({own:.2g}) {run['label']} comes to within {TIE - 1.0:.0%} of {how}, by {word}."
+        )
     else:
         text = (
             f"No: at equal error no regional or asynchronous run beats the best uniform; the nearest, {run['label']}, takes "
@@ -153,3 +159,7 @@ def _why_none(ground: dict[str, Any], error: str) -> str:
     if error in MATCHED and not ground["parting_time"]:
         return "; the references part before the first sample: choose another --error, or a shorter --end-time"
     return ""
+
+
+def _amount(cost: float) -> str:
+    return f"{cost:,.0f}" if cost >= 1000.0 else f"{cost:.3g}"

@@ -79,6 +79,11 @@ def test_the_verdict_says_no_where_uniform_steps_are_cheaper():
     assert "0.1: uniform (1 s)" in report["verdict"][0]
 
 
+def test_a_tie_is_no_gain():
+    report, _ = judged(make_run("regional", 0.4, 1.98, 4e-3))
+    assert report["verdict"][1].startswith("No gain: at equal error (0.004) regional λ=0.4 comes to within 5%")
+
+
 def test_the_verdict_says_yes_and_by_how_much():
     report, runs = judged(make_run("regional", 0.4, 0.5, 4e-3), make_run("paper", 0.4, 2.0, 0.2))
     assert report["verdict"][1].startswith("Yes: at equal error (0.004) regional λ=0.4 is 4.00 times as cheap")
