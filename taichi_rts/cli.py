@@ -1,4 +1,4 @@
-"""The command line: `taichi-rts run|scenes|info`."""
+"""The command line: `taichi-rts run|compare|scenes|info`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import tyro
 
 import taichi_rts as rts
 from taichi_rts import backend, report
+from taichi_rts.compare.command import Compare
 from taichi_rts.errors import Error, OutputError
 from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
 from taichi_rts.rendering.painter import Mode, PictureOptions
@@ -184,6 +185,7 @@ class Info:
 
 Command = (
     Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Compare, tyro.conf.subcommand("compare")]
     | Annotated[Scenes, tyro.conf.subcommand("scenes")]
     | Annotated[Info, tyro.conf.subcommand("info")]
 )

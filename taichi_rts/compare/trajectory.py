@@ -1,0 +1,58 @@
+"""The states of a run at the times at which it is compared."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+
+@dataclass
+class Trajectory:
+    """States at `times` [s], the first of them the start; particles in order of their stable ids, whose number may grow.
+
+    Attributes:
+        times: [s], (S,).
+        positions, velocities: for each time (N, dim) [m], [m/s].
+        densities: for each time (N,) [kg/m^3].
+        energies: for each time kinetic, potential and internal energy [J].
+    """
+
+    times: list[float] = field(default_factory=list)
+    positions: list[np.ndarray] = field(default_factory=list)
+    velocities: list[np.ndarray] = field(default_factory=list)
+    densities: list[np.ndarray] = field(default_factory=list)
+    energies: list[tuple[float, ...]] = field(default_factory=list)
+
+    def append(self, time: float, x: np.ndarray, v: np.ndarray, rho: np.ndarray, energy: Any) -> None:
+        """Add the state at `time` [s]."""
+        self.times.append(float(time))
+        self.positions.append(x)
+        self.velocities.append(v)
+        self.densities.append(rho)
+        self.energies.append(tuple(float(part) for part in energy))
+
+    def to_bytes(self) -> bytes:
+        """Return the trajectory as a compressed npz file without pickled objects."""
+        buffer = io.BytesIO()
+        np.savez_compressed(
+            buffer,
+            times=np.asarray(self.times),
+            counts=np.asarray([len(x) for x in self.positions]),
+            positions=np.concatenate(self.positions),
+            velocities=np.concatenate(self.velocities),
+            densities=np.concatenate(self.densities),
+            energies=np.asarray(self.energies),
+        )
+        return buffer.getvalue()
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Trajectory:
+        """Read what `to_bytes` wrote; raises `ValueError`, `KeyError`, `OSError` or `BadZipFile` if it did not."""
+        with np.load(io.BytesIO(data), allow_pickle=False) as file:
+            ends = np.cumsum(file["counts"])[:-1]
+            x, v, rho = (list(np.split(file[name], ends)) for name in ("positions", "velocities", "densities"))
+            energies = [tuple(float(part) for part in row) for row in file["energies"]]
+            return cls([float(time) for time in file["times"]], x, v, rho, energies)
