@@ -1,4 +1,4 @@
-"""The command line: `taichi-rts run|scenes|info`."""
+"""The command line: `taichi-rts run|stability|scenes|info`."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from taichi_rts import backend, report
 from taichi_rts.errors import Error, OutputError
 from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
 from taichi_rts.rendering.painter import Mode, PictureOptions
+from taichi_rts.stability.command import Stability
 
 STEPPERS: dict[str, Any] = {kind.name: kind for kind in (rts.Uniform, rts.Regional, rts.Asynchronous)}
 
@@ -184,6 +185,7 @@ class Info:
 
 Command = (
     Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Stability, tyro.conf.subcommand("stability")]
     | Annotated[Scenes, tyro.conf.subcommand("scenes")]
     | Annotated[Info, tyro.conf.subcommand("info")]
 )

@@ -111,10 +111,11 @@ def largest_stable(
     highest: float = 2.0,
     tolerance: float = 0.05,
     *,
+    first: float = FIRST_COURANT,
     fresh: Callable[[], Any] | None = None,
     run: Callable[[Scene, Stepper], Outcome] = watch,
 ) -> Bracket:
-    """Find the largest courant at which `scene` survives: double or halve from 0.4, then bisect to a relative `tolerance`.
+    """Find the largest courant at which `scene` survives: double or halve from `first`, then bisect to a relative `tolerance`.
 
     `make_stepper` turns a courant into a stepper. `fresh` is called before every run: each builds a `Simulation`, whose Taichi
     fields stay allocated until Taichi is started again, so pass e.g. `lambda: rts.init("cpu")` for more than a few runs.
@@ -140,7 +141,7 @@ def largest_stable(
 
     stable: float | None = None
     unstable: float | None = None
-    courant = min(max(FIRST_COURANT, lowest), highest)
+    courant = min(max(first, lowest), highest)
     while True:
         if survives(courant):
             stable = courant
