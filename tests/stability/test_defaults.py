@@ -16,7 +16,7 @@ def run(start_taichi, quick, case, stepper, demanded=None):
         return watch(BY_NAME[case].scene, setting.make(setting.default), samples=160, demanded_density=demanded)
 
 
-@pytest.mark.parametrize("stepper", ["serna", "adaptive", "regional", "asynchronous"])
+@pytest.mark.parametrize("stepper", ["serna", "adaptive", "regional"])
 def test_a_block_at_mach_one_half_on_a_pool(start_taichi, quick, stepper):
     outcome = run(start_taichi, quick, "pool_impact_0.5", stepper, demanded=1.46)  # of `suite.reference_density`
     assert outcome.reason == ""

@@ -12,6 +12,12 @@ from taichi_rts.stability.survival import largest_stable, watch
 BY_NAME = {case.name: case for case in CASES}
 
 
+@pytest.fixture
+def taichi(start_taichi, quick):
+    with start_taichi("cpu", "f32", **quick):
+        yield
+
+
 def search(limit, **options):
     """Bisect where everything up to `limit` survives."""
     fake = SimpleNamespace(calls=0)
@@ -51,7 +57,7 @@ def test_bounds_that_are_no_interval():
         search(1.0, lowest=3.0)
 
 
-def test_a_run_that_blows_up_ends_with_its_reason_and_a_diagnosis(taichi_cpu):
+def test_a_run_that_blows_up_ends_with_its_reason_and_a_diagnosis(taichi):
     scene = BY_NAME["wall_impact_0.7"].scene
     seen = []
     outcome = watch(scene, rts.Uniform(courant=1.2), on_sample=lambda sim: seen.append(sim.time))
@@ -70,13 +76,38 @@ def test_a_run_that_blows_up_ends_with_its_reason_and_a_diagnosis(taichi_cpu):
         assert words in str(found)
 
 
-def test_each_criterion_can_fail(taichi_cpu, monkeypatch):
+class FrozenRun:
+    """Looks like a `Simulation` of one particle that only gains energy; it may say that a wall did the work."""
+
+    def __init__(self, scene, end):
+        self.scene, self.end, self.time, self.count = scene, end, 0.0, 1
+        self.medium = SimpleNamespace(mass=1.0, sound_speed=1.0, rest_density=1000.0, support=0.2)
+        self.runaways, self.gain, self.works, self.base_step = 0, 0.0, False, 0.01
+
+    def advance_to(self, time):
+        self.time = time
+
+    def state(self):
+        return np.full((1, 2), 0.5), np.zeros((1, 2)), np.full(1, 1000.0), np.ones(1)
+
+    def steps(self):
+        return np.full(1, 0.01)
+
+    def energy(self):
+        return SimpleNamespace(total=10.0 * (1.0 + self.gain * self.time / self.end))
+
+    def work(self):
+        return 10.0 * self.gain * self.time / self.end if self.works else 0.0
+
+    @property
+    def statistics(self):
+        return {"runaways": self.runaways, "base_steps": 1}
+
+
+def test_each_criterion_can_fail(taichi, monkeypatch):
     scene = rts.Scene(
         domain=rts.Box((0, 0), (1, 1)), fluids=[rts.Block((0, 0), (1, 0.3))], spacing=0.1, sound_speed=20.0
     )
-    outcome = watch(scene, rts.Uniform(), end_time=0.02, samples=2, demanded_density=0.9)
-    assert outcome.reason.startswith("density 1.0")
-    assert outcome.reason.endswith("at most 1.05 x 0.900 allowed")
     outcome = watch(scene, rts.Uniform(), end_time=0.02, samples=2)
     assert outcome.survived
     assert outcome.time == 0.02
@@ -89,8 +120,25 @@ def test_each_criterion_can_fail(taichi_cpu, monkeypatch):
     assert survival.lost_particles(sim, x, 4) == "1 of 4 particles gone"
     assert survival.lost_particles(sim, x, 3) == "2 particles outside the walls"
     assert survival.lost_particles(sim, x[:1], 1) == ""
-    monkeypatch.setattr(survival, "ENERGY_MARGIN", -1.0)
-    assert watch(scene, rts.Uniform(), end_time=0.02, samples=2).reason.startswith("energy ")
+    monkeypatch.setattr(
+        survival, "Simulation", lambda *args, **options: built
+    )  # whose present state is looked at again
+    short = {"end_time": 0.02, "samples": 1}
+    built = FrozenRun(scene, outcome.time)
+    outcome = watch(scene, rts.Uniform(), demanded_density=0.9, **short)
+    assert outcome.reason == "density 1.000 of rest at t = 0 s, at most 1.05 x 0.900 allowed"
+    built.runaways = 3
+    assert watch(scene, rts.Uniform(), **short).reason == "3 speeds or accelerations limited at t = 0 s"
+    built.runaways, built.gain = 0, 0.06
+    assert watch(scene, rts.Uniform(), **short).reason == "energy +6.0% at t = 0.02 s, at most +5% of 10 J allowed"
+    built.works = True
+    assert watch(scene, rts.Uniform(), **short).survived
+
+
+def test_samples_lie_at_ends_of_base_steps_and_at_the_end():
+    times = survival.sample_times(SimpleNamespace(base_step=0.03), 0.2, 4)
+    assert times == pytest.approx([0.0, 0.03, 0.09, 0.15, 0.18, 0.2])
+    assert survival.sample_times(SimpleNamespace(base_step=0.01), 0.02, 40) == pytest.approx([0.0, 0.01, 0.02])
 
 
 def test_a_particle_behind_a_moving_wall_is_lost():
