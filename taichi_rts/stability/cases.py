@@ -105,7 +105,7 @@ def head_on(mach: float) -> Scene:
 
 def still_pool() -> Scene:
     """A pool 8 particles deep for 20 s; coarse, because it takes the most steps of all."""
-    return tank(4, 3, rts.Block((0, 0), (4, 2)), spacing=0.25, sound_speed=None, end_time=20.0)
+    return tank(16, 12, rts.Block((0, 0), (16, 8)), spacing=1.0, sound_speed=None, end_time=20.0)
 
 
 def deep_column() -> Scene:
