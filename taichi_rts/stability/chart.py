@@ -23,16 +23,14 @@ def make_table(plan: Plan, cells: Sequence[Cell]) -> Table:
     title = "survival at the defaults" if plan.quick else "largest stable courant (of the longest step)"
     table = Table(title=title, title_justify="left")
     table.add_column("case", no_wrap=True)
-    table.add_column("density\nallowed", justify="right")
+    table.add_column("density\nallowed", justify="right", no_wrap=True)
     for setting in plan.settings:
-        table.add_column(f"{setting.name}\n{setting.default:.3g}", justify="right")
+        heading = setting.name.replace("_", "\n")
+        table.add_column(f"{heading}\n[dim]{setting.default:.3g}[/]", justify="right", no_wrap=True, vertical="bottom")
     for case in plan.cases:
         row = [found.get((case.name, setting.name)) for setting in plan.settings]
         demanded = next((f"{1.05 * cell.demanded:.3f}" for cell in row if cell), "")
-        if case.missing:
-            table.add_row(case.name, "", f"[dim]needs {', '.join(case.missing)}[/]")
-        else:
-            table.add_row(case.name, demanded, *(mark(cell, plan.quick) for cell in row))
+        table.add_row(case.name, demanded, *(mark(cell, plan.quick) for cell in row))
     return table
 
 

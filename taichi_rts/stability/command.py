@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
+from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from taichi_rts.errors import OutputError
@@ -83,7 +84,13 @@ class Stability:
 
     def write(self, plan: Plan, cells: Sequence[Cell], draws: bool) -> None:
         """Print the map and write it, as far as it is done."""
-        console.print(chart.make_table(plan, cells))
+        width = max(
+            console.width, 40 + 14 * len(plan.settings)
+        )  # a narrow terminal had better wrap lines than cut numbers
+        Console(width=width).print(chart.make_table(plan, cells))
+        for case in plan.cases:
+            if case.missing:
+                console.print(f"not run: {case.name}, which needs {', '.join(case.missing)}", soft_wrap=True)
         for line in chart.failures(cells):
             console.print(f"[bold red]default fails[/] {line}", soft_wrap=True)
         facts: dict[str, Any] = {key: getattr(plan, key) for key in ("tolerance", "quick", "arch", "precision")}

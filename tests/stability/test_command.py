@@ -52,7 +52,7 @@ def test_a_map_is_written_and_resumed(call, capsys, monkeypatch):
     assert calls == [("tiny_pool", "serna")]
     out = capsys.readouterr().out
     assert "≥0.80" in out
-    assert "needs no_field" in out
+    assert "not run: future, which needs no_field" in out
     data = json.loads((folder / "stability.json").read_text())
     cell = data["cells"][0]
     assert (cell["case"], cell["setting"], cell["stable"], cell["unstable"]) == ("tiny_pool", "serna", 0.8, None)
