@@ -1,4 +1,4 @@
-"""The command line: `taichi-rts run|compare|scenes|info`."""
+"""The command line: `taichi-rts run|compare|stability|scenes|info`."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ import tyro
 import taichi_rts as rts
 from taichi_rts import backend, report
 from taichi_rts.compare.command import Compare
-from taichi_rts.errors import Error, OutputError
+from taichi_rts.errors import Error, OutputError, SimulationDivergedError
 from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
 from taichi_rts.rendering.painter import Mode, PictureOptions
+from taichi_rts.stability.command import Stability
+from taichi_rts.stability.diagnosis import FirstDiagnoses
 
 STEPPERS: dict[str, Any] = {kind.name: kind for kind in (rts.Uniform, rts.Regional, rts.Asynchronous)}
 
@@ -125,10 +127,17 @@ class Run:
         check_size(self.width, self.height)
         device = rts.init(self.arch, self.precision)
         recorder = Recorder(scene, panels, options, recording, debug=self.debug)
-        with report.progress(recorder.runs, scene.end_time, device) as on_frame:
-            recorder.record(scene.end_time, on_frame)
+        diagnoses = FirstDiagnoses(recorder.runs)
+        try:
+            with report.progress(recorder.runs, scene.end_time, device, diagnoses.look) as on_frame:
+                recorder.record(scene.end_time, on_frame)
+        except SimulationDivergedError:
+            diagnoses.look()
+            for diagnosis in diagnoses.found.values():
+                report.print_diagnosis(diagnosis)
+            raise
         for stepper, sim in recorder.runs.items():
-            report.print_table(sim, recorder.initial_energy[stepper])
+            report.print_table(sim, recorder.initial_energy[stepper], diagnoses.found.get(stepper))
         report.print_folder(folder, frames)
 
     def make_stepper(self) -> Any:
@@ -186,6 +195,7 @@ class Info:
 Command = (
     Annotated[Run, tyro.conf.subcommand("run")]
     | Annotated[Compare, tyro.conf.subcommand("compare")]
+    | Annotated[Stability, tyro.conf.subcommand("stability")]
     | Annotated[Scenes, tyro.conf.subcommand("scenes")]
     | Annotated[Info, tyro.conf.subcommand("info")]
 )

@@ -19,13 +19,19 @@ from taichi_rts.diagnostics import Energy, speedup_bound
 from taichi_rts.rendering.painter import level_classes, milliseconds
 from taichi_rts.scene import Scene
 from taichi_rts.simulation import Simulation
+from taichi_rts.stability.diagnosis import Diagnosis
 
 console = Console()
 
 
 @contextmanager
-def progress(runs: Mapping[Any, Simulation], end_time: float, device: Backend) -> Iterator[Callable[[float], None]]:
-    """Show a bar with physical time, active fraction, updates/s and time left; yields what to call after each frame."""
+def progress(
+    runs: Mapping[Any, Simulation], end_time: float, device: Backend, look: Callable[[], None] = lambda: None
+) -> Iterator[Callable[[float], None]]:
+    """Show a bar with physical time, active fraction, updates/s and time left; yields what to call after each frame.
+
+    `look` is called at each frame.
+    """
     first = next(iter(runs.values()))
     columns = [
         TextColumn("{task.description}"),
@@ -38,6 +44,7 @@ def progress(runs: Mapping[Any, Simulation], end_time: float, device: Backend) -
         task = bar.add_task(label, total=end_time, work="")
 
         def on_frame(time: float) -> None:
+            look()
             statistics = [sim.statistics for sim in runs.values()]
             updates = sum(s["particle_updates"] for s in statistics)
             seconds = sum(s["wall_seconds"] for s in statistics)
@@ -52,8 +59,8 @@ def rate(updates: float, seconds: float) -> str:
     return f"{updates / seconds / 1e6:.2f} M updates/s" if seconds > 0.0 else "- updates/s"
 
 
-def print_table(sim: Simulation, initial_energy: Energy) -> None:
-    """Print shares per level, active fraction, updates/s, the bound of the speed-up and the energy drift."""
+def print_table(sim: Simulation, initial_energy: Energy, diagnosis: Diagnosis | None = None) -> None:
+    """Print shares per level, active fraction, updates/s, the bound of the speed-up, the energy drift, and a diagnosis."""
     statistics = sim.statistics
     levels = Table(title=f"{sim.scene.name}, {sim.stepper.name} steps", title_justify="left")
     for heading in ("level", "step [ms]", "share of particles", "share of updates"):
@@ -90,6 +97,13 @@ def print_table(sim: Simulation, initial_energy: Energy) -> None:
     if statistics["runaways"]:
         facts.add_row("[bold red]blown up[/]", f"limited {statistics['runaways']:,} times; use a smaller --courant")
     console.print(facts)
+    if diagnosis is not None:
+        print_diagnosis(diagnosis)
+
+
+def print_diagnosis(diagnosis: Diagnosis) -> None:
+    """Say when and why a run blew up, and what to do about it."""
+    console.print(f"[bold red]blown up[/] {diagnosis}", soft_wrap=True, highlight=False)
 
 
 def level_rows(sim: Simulation, statistics: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:

@@ -80,7 +80,7 @@ def watch(
     end_time: float | None = None,
     on_sample: Callable[[Simulation], None] | None = None,
 ) -> Outcome:
-    """Run `scene` and look at it at `samples` equal times up to its end; stop at the first violation.
+    """Run `scene` and look at it at `samples` times up to its end (`sample_times`); stop at the first violation.
 
     It survives if at every sample: all is finite, no speed or acceleration was limited (`runaways`), no particle is lost, the
     largest density is at most 1.05 x `demanded_density` (over rest; None: `demands.demanded_density`), and the total energy
@@ -92,9 +92,10 @@ def watch(
     moving = bool(getattr(scene, "moving_walls", ()) or getattr(scene, "inflows", ()))
     sim = Simulation(scene, stepper, debug=moving)  # only then is their work added up
     watcher = _Watcher(sim, DENSITY_MARGIN, demanded)
-    for time in np.linspace(0.0, scene.end_time if end_time is None else end_time, samples + 1):
+    end = scene.end_time if end_time is None else end_time
+    for time in sample_times(sim, end, samples):
         try:
-            sim.advance_to(float(time))
+            sim.advance_to(time)
         except SimulationDivergedError as error:
             return watcher.outcome(str(error).partition(";")[0])
         if reason := watcher.look():
@@ -111,10 +112,11 @@ def largest_stable(
     highest: float = 2.0,
     tolerance: float = 0.05,
     *,
+    first: float = FIRST_COURANT,
     fresh: Callable[[], Any] | None = None,
     run: Callable[[Scene, Stepper], Outcome] = watch,
 ) -> Bracket:
-    """Find the largest courant at which `scene` survives: double or halve from 0.4, then bisect to a relative `tolerance`.
+    """Find the largest courant at which `scene` survives: double or halve from `first`, then bisect to a relative `tolerance`.
 
     `make_stepper` turns a courant into a stepper. `fresh` is called before every run: each builds a `Simulation`, whose Taichi
     fields stay allocated until Taichi is started again, so pass e.g. `lambda: rts.init("cpu")` for more than a few runs.
@@ -140,7 +142,7 @@ def largest_stable(
 
     stable: float | None = None
     unstable: float | None = None
-    courant = min(max(FIRST_COURANT, lowest), highest)
+    courant = min(max(first, lowest), highest)
     while True:
         if survives(courant):
             stable = courant
@@ -158,6 +160,17 @@ def largest_stable(
             courant = 0.5 * (stable + unstable)
         else:
             return bracket(stable, unstable)
+
+
+def sample_times(sim: Simulation, end: float, samples: int) -> list[float]:
+    """Times [s] at which to look: `samples` equal ones, each moved back to the last end of a base step, and `end` itself.
+
+    Between two evaluations a reader sees predicted velocities but densities of the last evaluation, and so where fluid bounces
+    an energy that nobody has: +7 % for a block at Mach 0.7 on a pool that gains nothing.
+    """
+    step = sim.base_step
+    times = {math.floor(end * k / samples / step * (1.0 + 1e-12)) * step for k in range(samples + 1)}
+    return sorted({time for time in times if time < end * (1.0 - 1e-9)} | {end})
 
 
 def energy_scale(sim: Simulation, start: float, work: float) -> float:

@@ -5,6 +5,7 @@ import pytest
 import taichi_rts as rts
 from taichi_rts import report
 from taichi_rts.diagnostics import Energy, speedup_bound
+from taichi_rts.stability.diagnosis import Diagnosis
 
 STATISTICS = {
     "base_steps": 100,
@@ -80,3 +81,18 @@ def test_table_shows_what_passes_cost(capsys, monkeypatch):
 def test_speedup_bound_counts_the_passes_of_a_base_step():
     assert speedup_bound(0.5, 0.2) == pytest.approx(1 / 0.6)
     assert speedup_bound(0.5, 0.2, passes=0.25) == pytest.approx(1 / 0.45)
+
+
+def test_a_run_that_blew_up_says_where_and_why(capsys, monkeypatch):
+    diagnosis = Diagnosis(
+        0.02, 7, (0.1, 0.25), (90.0, 0.0), 2, 1e-3, "speed 90 m/s reaches the limit", "an impact", "a smaller courant"
+    )
+    monkeypatch.setattr(report, "console", report.Console(width=120))
+    sim = simulation(rts.Regional(), [0.2, 0.8], [0.3, 0.7], runaways=3)
+    report.print_table(sim, Energy(1.0, 2.0, 1.0), diagnosis)
+    words = " ".join(capsys.readouterr().out.split())
+    assert "blown up limited 3 times" in words
+    assert (
+        "blown up at t = 0.02 s particle 7 at (0.1, 0.25) m, level 2 with a step of 1 ms: speed 90 m/s reaches the limit. "
+        "Likely cause: an impact. Remedy: a smaller courant." in words
+    )

@@ -1,0 +1,140 @@
+"""`taichi-rts stability`: the map of which case each stepper survives, and up to which step."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from taichi_rts.errors import OutputError
+from taichi_rts.output.files import write_bytes, write_json
+from taichi_rts.report import console
+from taichi_rts.stability import chart
+from taichi_rts.stability.cases import CASES
+from taichi_rts.stability.suite import SETTINGS, Cell, Plan, run_plan
+
+T = TypeVar("T")
+ARTEFACTS = ("stability.json", "stability.csv", "stability.png", "cells")  # what it writes, and all --overwrite removes
+
+
+@dataclasses.dataclass(frozen=True)
+class Stability:
+    """Run hard cases with every stepper, and find the largest courant that each survives.
+
+    Writes OUTPUT_DIR/stability.json, .csv and .png, and a file for each cell as soon as it is done, so that --resume goes on
+    after a stop. Exit codes: 0 done, 1 with --quick when a default does not survive, 2 wrong input.
+    """
+
+    cases: tuple[str, ...] = ()
+    """Names of cases; by default all."""
+    steppers: tuple[str, ...] = ()
+    """Names of steppers; by default all."""
+    tolerance: float = 0.05
+    """How close the largest stable and the smallest unstable courant have to be, relative to each other."""
+    quick: bool = False
+    """Only say whether each stepper survives at its default courant."""
+    resume: bool = False
+    """Keep the cells that an earlier call with the same options stored in the output folder."""
+    overwrite: bool = False
+    """Replace an earlier map in the output folder."""
+    plot: bool = True
+    """Draw the heat map (needs the extra `plots`)."""
+    output_dir: Path = Path("out") / "stability"
+    """Folder for the results."""
+    arch: Literal["auto", "cuda", "vulkan", "cpu"] = "cpu"
+    """Where kernels run. The cases are so small that a CPU is the fastest."""
+    precision: Literal["f32", "f64"] = "f32"
+    """Floating-point precision."""
+
+    def __call__(self) -> None:
+        """Run it."""
+        if not 0.001 <= self.tolerance <= 1.0:
+            raise OutputError(f"tolerance {self.tolerance:g} is not between 0.001 and 1; try 0.05")
+        cases = choose("case", self.cases, CASES)
+        settings = choose("stepper", self.steppers, SETTINGS)
+        plan = Plan(cases, settings, self.tolerance, self.quick, self.arch, self.precision)
+        draws = self.plot and not self.quick
+        if draws:
+            chart.require_matplotlib()
+        prepare_folder(self.output_dir, self.resume, self.overwrite)
+        plan.fresh()  # so that a missing arch is said before anything else
+        cells: list[Cell] = []
+        try:
+            self.run(plan, cells)
+        finally:
+            if cells:
+                self.write(plan, cells, draws)
+        if self.quick and chart.failures(cells):
+            raise SystemExit(1)
+
+    def run(self, plan: Plan, cells: list[Cell]) -> None:
+        """Run all cells under a progress bar and append them to `cells` as they are done."""
+        columns = [TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()]
+        with Progress(*columns, console=console) as bar:
+            task = bar.add_task("", total=len(plan.cells))
+            for cell in run_plan(plan, self.output_dir, lambda what: bar.update(task, description=what)):
+                cells.append(cell)
+                bar.advance(task)
+
+    def write(self, plan: Plan, cells: Sequence[Cell], draws: bool) -> None:
+        """Print the map and write it, as far as it is done."""
+        width = max(
+            console.width, 40 + 14 * len(plan.settings)
+        )  # a narrow terminal had better wrap lines than cut numbers
+        Console(width=width).print(chart.make_table(plan, cells))
+        for case in plan.cases:
+            if case.missing:
+                console.print(f"not run: {case.name}, which needs {', '.join(case.missing)}", soft_wrap=True)
+        for line in chart.failures(cells):
+            console.print(f"[bold red]default fails[/] {line}", soft_wrap=True)
+        facts: dict[str, Any] = {key: getattr(plan, key) for key in ("tolerance", "quick", "arch", "precision")}
+        skipped = {case.name: list(case.missing) for case in plan.cases if case.missing}
+        write_json(
+            self.output_dir / "stability.json",
+            facts
+            | {"complete": len(cells) == len(plan.cells), "needs": skipped}
+            | {"cases": {case.name: case.what for case in plan.cases}, "cells": [cell.plain() for cell in cells]},
+        )
+        write_bytes(self.output_dir / "stability.csv", chart.make_csv(cells))
+        if draws:
+            write_bytes(self.output_dir / "stability.png", chart.draw_map(plan, cells))
+        console.print(f"{len(cells)} of {len(plan.cells)} cells in {self.output_dir}", soft_wrap=True)
+
+
+def choose(kind: str, names: Sequence[str], known: Sequence[T]) -> list[T]:
+    """Return those of `known` that `names` lists, in their own order, or all; raises `OutputError` for an unknown name."""
+    by_name = {each.name: each for each in known}  # type: ignore[attr-defined]
+    for name in names:
+        if name not in by_name:
+            near = difflib.get_close_matches(name, by_name, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise OutputError(f"{kind} {name!r} is unknown{hint} (known: {', '.join(by_name)})")
+    return [each for name, each in by_name.items() if not names or name in names]
+
+
+def prepare_folder(folder: Path, resume: bool, overwrite: bool) -> None:
+    """Make `folder` ready: new, with an earlier map to go on with, or with an earlier map removed.
+
+    Raises `OutputError` if it holds a map and neither `resume` nor `overwrite` says what to do, or both do.
+    """
+    if resume and overwrite:
+        raise OutputError("--resume keeps what --overwrite removes; give one of them")
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"{folder} is a file, and a folder is needed; choose another --output-dir")
+    found = [name for name in ARTEFACTS if (folder / name).exists()]
+    if found and not (resume or overwrite):
+        raise OutputError(
+            f"{folder} already holds a map ({', '.join(found)}); give --resume or --overwrite, or choose another --output-dir"
+        )
+    for name in found if overwrite else []:
+        target = folder / name
+        if target.is_dir():
+            shutil.rmtree(target)
+        else:
+            target.unlink()

@@ -1,0 +1,202 @@
+"""The suite: every case with every stepper. A cell of the map is one bisection, kept on disk as soon as it is done."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+from collections.abc import Callable, Iterator, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import taichi_rts as rts
+from taichi_rts.output.files import write_json
+from taichi_rts.stability.cases import Case
+from taichi_rts.stability.demands import demanded_density
+from taichi_rts.stability.survival import Outcome, largest_stable, watch
+from taichi_rts.stepping.base import Stepper
+
+LOWEST, HIGHEST = 0.05, 2.0  # courants between which the largest stable one is looked for; steppers take no more than 2
+REFERENCE_COURANTS = (0.1, 0.05, 0.025)
+
+
+@dataclasses.dataclass(frozen=True)
+class Setting:
+    """A stepper with all but its courant fixed.
+
+    `make` takes a courant and returns the stepper; `default` is the courant that it has without one.
+    """
+
+    name: str
+    make: Callable[[float], Any]
+    default: float
+
+
+SETTINGS: tuple[Setting, ...] = (
+    Setting("serna", lambda c: rts.Uniform(courant=c), rts.Uniform().courant),
+    Setting("euler", lambda c: rts.Uniform(courant=c, integrator="symplectic_euler"), rts.Uniform().courant),
+    Setting("adaptive", lambda c: rts.Uniform(courant=c, adaptive=True), rts.Uniform().courant),
+    Setting("regional", lambda c: rts.Regional(courant=c), rts.Regional().resolved("courant")),
+    Setting("regional_3", lambda c: rts.Regional(courant=c, levels=3), rts.Regional(levels=3).resolved("courant")),
+    Setting(
+        "regional_paper",
+        lambda c: rts.Regional(courant=c, preset="paper"),
+        rts.Regional(preset="paper").resolved("courant"),
+    ),
+    Setting("asynchronous", lambda c: rts.Asynchronous(courant=c), rts.Asynchronous().longest_courant),
+    Setting(
+        "asynchronous_integers",
+        lambda c: rts.Asynchronous(courant=c, steps="integers"),
+        rts.Asynchronous().longest_courant,
+    ),
+)
+"""All steppers, in the order of the map's columns."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """What to run: `cases` by `settings`, to a relative `tolerance` or `quick` (the defaults only), on a device."""
+
+    cases: Sequence[Case]
+    settings: Sequence[Setting]
+    tolerance: float = 0.05
+    quick: bool = False
+    arch: str = "cpu"
+    precision: str = "f32"
+
+    @property
+    def cells(self) -> list[tuple[Case, Setting]]:
+        """All cells whose case can be built in this version, case by case."""
+        return [(case, setting) for case in self.cases if not case.missing for setting in self.settings]
+
+    def key(self, case: Case, setting: Setting | None) -> str:
+        """Say what a stored result depends on, as a hash: scene, stepper, search and device, but not the solver's code."""
+        stepper = None if setting is None else repr(setting.make(setting.default))
+        search = (self.tolerance, self.quick, LOWEST, HIGHEST) if setting else REFERENCE_COURANTS
+        facts = [case.scene.to_dict(), case.samples, stepper, search, self.arch, self.precision, version("taichi_rts")]
+        return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
+
+    def fresh(self) -> None:
+        """Start Taichi anew, which frees the fields of earlier runs."""
+        rts.init(self.arch, self.precision)
+
+
+@dataclasses.dataclass(frozen=True)
+class Cell:
+    """One cell of the map.
+
+    Attributes:
+        case, setting, default: their names, and the stepper's default courant.
+        demanded: density over rest that the case demands.
+        stable, unstable, reason: as in `survival.Bracket`; None and "" where `quick` did not look.
+        longest: Courant number of the longest step that was taken at `stable`.
+        outcome: how the run at the default went.
+        runs: the courants tried.
+    """
+
+    case: str
+    setting: str
+    default: float
+    demanded: float
+    stable: float | None
+    unstable: float | None
+    reason: str
+    longest: float | None
+    outcome: Outcome
+    runs: tuple[float, ...]
+
+    def plain(self) -> dict[str, Any]:
+        """Return it as data that JSON can hold."""
+        return _plain(dataclasses.asdict(self))
+
+    @classmethod
+    def load(cls, data: dict[str, Any]) -> Cell:
+        """Rebuild a cell from its JSON."""
+        return cls(**(data | {"outcome": Outcome(**data["outcome"]), "runs": tuple(data["runs"])}))
+
+
+def run_plan(plan: Plan, folder: Path, on_cell: Callable[[str], None]) -> Iterator[Cell]:
+    """Yield all cells: from `folder` where they are stored there under the same key, else run and stored.
+
+    `on_cell` is told what comes next.
+    """
+    for case, setting in plan.cells:
+        on_cell(f"{case.name} with {setting.name}")
+        path, key = folder / "cells" / f"{case.name}--{setting.name}.json", plan.key(case, setting)
+        stored = _read(path, key)
+        if stored is None:
+            cell = run_cell(plan, case, setting, _demanded(plan, case, folder))
+            write_json(path, {"key": key, "cell": cell.plain()})
+        else:
+            cell = Cell.load(stored["cell"])
+        yield cell
+
+
+def run_cell(plan: Plan, case: Case, setting: Setting, demanded: float) -> Cell:
+    """Bisect one cell, or only try its default."""
+    scene = case.scene
+
+    def run(scene: rts.Scene, stepper: Stepper) -> Outcome:
+        return watch(scene, stepper, samples=case.samples, demanded_density=demanded)
+
+    if plan.quick:
+        plan.fresh()
+        outcome = run(scene, setting.make(setting.default))
+        runs: tuple[tuple[float, Outcome], ...] = ((setting.default, outcome),)
+        stable, unstable = (setting.default, None) if outcome.survived else (None, setting.default)
+        reason = outcome.reason
+    else:
+        bracket = largest_stable(
+            scene, setting.make, LOWEST, HIGHEST, plan.tolerance, first=setting.default, fresh=plan.fresh, run=run
+        )
+        runs, stable, unstable, reason = bracket.runs, bracket.stable, bracket.unstable, bracket.reason
+    longest = next((outcome.courant for courant, outcome in runs if courant == stable), None)
+    tried = tuple(courant for courant, _ in runs)
+    return Cell(
+        case.name, setting.name, setting.default, demanded, stable, unstable, reason, longest, runs[0][1], tried
+    )
+
+
+def reference_density(case: Case, fresh: Callable[[], Any]) -> float:
+    """Largest density over rest that `case` demands of this discretisation.
+
+    Behind a shock, single particles overshoot the jump however short the steps are: the lattice of particles has next to no
+    dissipation at that scale. So where shocks meet particles, three runs with short uniform steps say what the case demands,
+    if that is more than `demands.demanded_density`. Three, because which particle is hit hardest is chaotic.
+    """
+    demanded = demanded_density(case.scene)
+    for courant in REFERENCE_COURANTS if case.shocks else ():
+        fresh()
+        outcome = watch(case.scene, SETTINGS[0].make(courant), samples=case.samples, demanded_density=math.inf)
+        if outcome.survived:
+            demanded = max(demanded, outcome.density)
+    return demanded
+
+
+def _demanded(plan: Plan, case: Case, folder: Path) -> float:
+    path, key = folder / "cells" / f"{case.name}--reference.json", plan.key(case, None)
+    stored = _read(path, key)
+    if stored is None:
+        stored = {"key": key, "demanded": reference_density(case, plan.fresh), "formula": demanded_density(case.scene)}
+        write_json(path, stored)
+    return stored["demanded"]
+
+
+def _read(path: Path, key: str) -> dict[str, Any] | None:
+    """Return what is stored at `path` if it belongs to `key`."""
+    try:
+        data = json.loads(path.read_text())
+    except (OSError, ValueError):
+        return None
+    return data if isinstance(data, dict) and data.get("key") == key else None
+
+
+def _plain(data: Any) -> Any:
+    """Replace numbers that JSON cannot hold, as of a run that blew up, by 1e300."""
+    if isinstance(data, dict):
+        return {key: _plain(value) for key, value in data.items()}
+    if isinstance(data, float) and not math.isfinite(data):
+        return 1e300
+    return data
