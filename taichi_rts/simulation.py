@@ -117,11 +117,14 @@ class Simulation:
         self._gravity_work = 0.0
         self._initial_momentum = self.momentum()
         began = clock.perf_counter()
+        self._start()
+        self.setup_seconds = clock.perf_counter() - began
+
+    def _start(self) -> None:
         self.step()  # lines 1-2: validity 0, so everybody is due at tick 0, where the first forces are evaluated
         self.schedule.take_counts()
         self.schedule.begin(self.timeline, 0)  # as the line above: so that `wall_seconds` holds no compilation
         ti.sync()
-        self.setup_seconds = clock.perf_counter() - began
 
     def step(self) -> None:
         """Do what is due at the present tick: lines 4-29 of Algorithm 1."""

@@ -98,7 +98,7 @@ def draw_map(plan: Plan, cells: Sequence[Cell]) -> bytes:
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
 
-    cases: list[Case] = [case for case in plan.cases if not case.missing]
+    cases: list[Case] = list(plan.cases)
     settings: Sequence[Setting] = plan.settings
     figure = Figure(figsize=(2.6 + 1.15 * len(settings), 1.6 + 0.44 * len(cases)), layout="constrained")
     canvas = FigureCanvasAgg(figure)

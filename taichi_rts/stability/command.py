@@ -88,17 +88,13 @@ class Stability:
             console.width, 40 + 14 * len(plan.settings)
         )  # a narrow terminal had better wrap lines than cut numbers
         Console(width=width).print(chart.make_table(plan, cells))
-        for case in plan.cases:
-            if case.missing:
-                console.print(f"not run: {case.name}, which needs {', '.join(case.missing)}", soft_wrap=True)
         for line in chart.failures(cells):
             console.print(f"[bold red]default fails[/] {line}", soft_wrap=True)
         facts: dict[str, Any] = {key: getattr(plan, key) for key in ("tolerance", "quick", "arch", "precision")}
-        skipped = {case.name: list(case.missing) for case in plan.cases if case.missing}
         write_json(
             self.output_dir / "stability.json",
             facts
-            | {"complete": len(cells) == len(plan.cells), "needs": skipped}
+            | {"complete": len(cells) == len(plan.cells)}
             | {"cases": {case.name: case.what for case in plan.cases}, "cells": [cell.plain() for cell in cells]},
         )
         write_bytes(self.output_dir / "stability.csv", chart.make_csv(cells))

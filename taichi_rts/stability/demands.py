@@ -68,20 +68,19 @@ def impact_speed(scene: Scene) -> float:
     none; after a change of gravity fluid falls from the far side of the domain. The speed of moving walls and of inflow counts.
     """
     falls = [_fall(scene, fluid) + top_speed(fluid) ** 2 for fluid in scene.fluids]
-    inflows = [float(np.dot(each.velocity, each.velocity)) for each in getattr(scene, "inflows", ())]
+    inflows = [float(np.dot(each.velocity, each.velocity)) for each in scene.inflows]
     return math.sqrt(max(falls + inflows) + 2.0 * _body_force_potential(scene)) + wall_speed(scene)
 
 
 def wall_speed(scene: Scene) -> float:
     """Largest speed [m/s] of a moving face of the domain."""
-    slopes = (np.abs(np.diff(wall.displacements) / np.diff(wall.times)) for wall in getattr(scene, "moving_walls", ()))
-    return float(max(itertools.chain.from_iterable(slopes), default=0.0))
+    return max((abs(v) for wall in scene.moving_walls for v in wall.velocities), default=0.0)
 
 
 def gravities(scene: Scene) -> Iterator[tuple[float, ...]]:
     """All values that gravity [m/s^2] takes."""
     yield scene.acceleration
-    yield from (change.gravity for change in getattr(scene, "gravity_changes", ()))
+    yield from (change.gravity for change in scene.gravity_changes)
 
 
 def settled_depth(scene: Scene, gravity: tuple[float, ...]) -> float:

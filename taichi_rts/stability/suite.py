@@ -15,6 +15,7 @@ import taichi_rts as rts
 from taichi_rts.output.files import write_json
 from taichi_rts.stability.cases import Case
 from taichi_rts.stability.demands import demanded_density
+from taichi_rts.stability.rerun import Rerun
 from taichi_rts.stability.survival import Outcome, largest_stable, watch
 from taichi_rts.stepping.base import Stepper
 
@@ -68,8 +69,8 @@ class Plan:
 
     @property
     def cells(self) -> list[tuple[Case, Setting]]:
-        """All cells whose case can be built in this version, case by case."""
-        return [(case, setting) for case in self.cases if not case.missing for setting in self.settings]
+        """All cells, case by case."""
+        return [(case, setting) for case in self.cases for setting in self.settings]
 
     def key(self, case: Case, setting: Setting | None) -> str:
         """Say what a stored result depends on, as a hash: scene, stepper, search and device, but not the solver's code."""
@@ -80,7 +81,7 @@ class Plan:
 
     def fresh(self) -> None:
         """Start Taichi anew, which frees the fields of earlier runs."""
-        rts.init(self.arch, self.precision)
+        rts.init(self.arch, self.precision, unrolling_limit=0)  # `Rewind` unrolls over all fields
 
 
 @dataclasses.dataclass(frozen=True)
@@ -136,21 +137,18 @@ def run_plan(plan: Plan, folder: Path, on_cell: Callable[[str], None]) -> Iterat
 
 def run_cell(plan: Plan, case: Case, setting: Setting, demanded: float) -> Cell:
     """Bisect one cell, or only try its default."""
-    scene = case.scene
+    scene, build = case.scene, Rerun(plan.fresh)
 
     def run(scene: rts.Scene, stepper: Stepper) -> Outcome:
-        return watch(scene, stepper, samples=case.samples, demanded_density=demanded)
+        return watch(scene, stepper, samples=case.samples, demanded_density=demanded, build=build)
 
     if plan.quick:
-        plan.fresh()
         outcome = run(scene, setting.make(setting.default))
         runs: tuple[tuple[float, Outcome], ...] = ((setting.default, outcome),)
         stable, unstable = (setting.default, None) if outcome.survived else (None, setting.default)
         reason = outcome.reason
     else:
-        bracket = largest_stable(
-            scene, setting.make, LOWEST, HIGHEST, plan.tolerance, first=setting.default, fresh=plan.fresh, run=run
-        )
+        bracket = largest_stable(scene, setting.make, LOWEST, HIGHEST, plan.tolerance, first=setting.default, run=run)
         runs, stable, unstable, reason = bracket.runs, bracket.stable, bracket.unstable, bracket.reason
     longest = next((outcome.courant for courant, outcome in runs if courant == stable), None)
     tried = tuple(courant for courant, _ in runs)
@@ -166,10 +164,11 @@ def reference_density(case: Case, fresh: Callable[[], Any]) -> float:
     dissipation at that scale. So where shocks meet particles, three runs with short uniform steps say what the case demands,
     if that is more than `demands.demanded_density`. Three, because which particle is hit hardest is chaotic.
     """
-    demanded = demanded_density(case.scene)
+    scene, build = case.scene, Rerun(fresh)
+    demanded = demanded_density(scene)
     for courant in REFERENCE_COURANTS if case.shocks else ():
-        fresh()
-        outcome = watch(case.scene, SETTINGS[0].make(courant), samples=case.samples, demanded_density=math.inf)
+        stepper = SETTINGS[0].make(courant)
+        outcome = watch(scene, stepper, samples=case.samples, demanded_density=math.inf, build=build)
         if outcome.survived:
             demanded = max(demanded, outcome.density)
     return demanded

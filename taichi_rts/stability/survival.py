@@ -79,6 +79,7 @@ def watch(
     demanded_density: float | None = None,
     end_time: float | None = None,
     on_sample: Callable[[Simulation], None] | None = None,
+    build: Callable[..., Simulation] | None = None,
 ) -> Outcome:
     """Run `scene` and look at it at `samples` times up to its end (`sample_times`); stop at the first violation.
 
@@ -86,11 +87,12 @@ def watch(
     largest density is at most 1.05 x `demanded_density` (over rest; None: `demands.demanded_density`), and the total energy
     less the work of walls, gravity changes and inflow is at most 5 % of `energy_scale` above the start's.
 
-    Works in any precision, on the backend that was initialised last. Steps do not depend on `samples`.
+    `build` takes scene, stepper and `debug` and returns the simulation, by default a new one. Works in any precision, on the
+    backend that was initialised last. Steps do not depend on `samples`.
     """
     demanded = demands.demanded_density(scene) if demanded_density is None else demanded_density
-    moving = bool(getattr(scene, "moving_walls", ()) or getattr(scene, "inflows", ()))
-    sim = Simulation(scene, stepper, debug=moving)  # only then is their work added up
+    moving = bool(scene.moving_walls or scene.inflows)
+    sim = (build or Simulation)(scene, stepper, debug=moving)  # only then is their work added up
     watcher = _Watcher(sim, DENSITY_MARGIN, demanded)
     end = scene.end_time if end_time is None else end_time
     for time in sample_times(sim, end, samples):
@@ -209,7 +211,7 @@ class _Watcher:
         self.density = max(self.density, density)
         self.speed = max(self.speed, float(np.linalg.norm(v.astype(np.float64), axis=1).max()))
         self.courant = max(self.courant, float(sim.steps().max()) * sim.medium.sound_speed / sim.medium.support)
-        work = sim.work() if hasattr(sim, "work") else 0.0
+        work = sim.work()
         scale = energy_scale(sim, self.start, work)
         gain = (sim.energy().total - work - self.start) / scale
         self.energy = max(self.energy, 1.0 + gain)
@@ -246,10 +248,10 @@ def lost_particles(sim: Simulation, x: np.ndarray, expected: int) -> str:
     if sim.count < expected:
         return f"{expected - sim.count} of {expected} particles gone"
     lower, upper = (np.array(corner, dtype=np.float64) for corner in (sim.scene.domain.lower, sim.scene.domain.upper))
-    for wall in getattr(sim.scene, "moving_walls", ()):
+    for wall in sim.scene.moving_walls:
         axis, face = "xyz".index(wall.face[0]), lower if wall.face[1] == "-" else upper
         face[axis] += np.interp(sim.time, wall.times, wall.displacements)
     slack = 1e-3 * sim.scene.spacing + 4.0 * np.spacing(np.abs(x).max())  # the rounding of the state's precision
-    closed = np.array(["xyz"[d] not in getattr(sim.scene, "periodic", ()) for d in range(sim.scene.dim)])
+    closed = np.array(["xyz"[d] not in sim.scene.periodic for d in range(sim.scene.dim)])
     outside = (((x < lower - slack) | (x > upper + slack)) & closed).any(axis=1)
     return f"{int(outside.sum())} particles outside the walls" if outside.any() else ""

@@ -36,8 +36,6 @@ from taichi_rts.validation import FROZEN, validated
 LARGEST_COURANT = 0.4  # as for `Uniform` and `Regional`
 DRIFT = 0.05
 """How far a particle may move over the support radius between two sorts: a little more than the longest step at Mach 0.1."""
-MACH = 0.1
-"""Speeds up to this share of c_s do not shorten a step: the sound speed is chosen for them (Becker & Teschner 2007)."""
 LOG = 1 << 14  # passes whose width is kept on the device between two looks
 
 
@@ -47,7 +45,8 @@ class Asynchronous:
     """Every cell (a block of the grid) has its own time and its own step.
 
     Attributes:
-        courant: the longest step is courant r/c_s; a cell faster than Mach 0.1 takes 1.1 courant r/(c_s + |v|). None: 0.4.
+        courant: the longest step is courant r/c_s; a cell faster than Mach 0.1 takes 1.1 courant r/(c_s + |v|), and one that is
+            compressed by more than 3 % one shorter by as much as its sound is faster. None: 0.4.
         levels: base steps (ticks) in the longest step, more if the most viscous fluid needs shorter ones; 1 forces all equal.
         steps: lengths that steps may have, in ticks: "powers_of_two" keeps cells in step with each other, so that many can
             step at once; "integers" rounds the limits down to whole ticks only.
@@ -141,18 +140,16 @@ class AsynchronousSchedule(Schedule):
         self, stepper: Asynchronous, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline
     ) -> None:
         super().__init__(particles, grid)
-        self.stepper = stepper
         self.scene = scene
-        self.tick = timeline.tick
         self.levels = stepper.ticks(scene)
+        self.retime(stepper, timeline)
         self.maxima = BlockMaxima(scene, particles, grid)
         self.powers_of_two = stepper.steps == "powers_of_two"
         self.staggered = stepper.stagger is not None
         self.seed = stepper.stagger or 0
         self.beside = BlockLimiter(grid.geometry)
         self.limiter = NeighbourLimiter(doubling=True, aligned=self.powers_of_two)
-        self.fast_reach = (1.0 + MACH) * stepper.longest_courant * scene.support  # [m]
-        self.slow_speed = MACH * scene.wave_speed
+        self.slow_speed = criteria.MACH * scene.wave_speed
         self.viscous_reach = criteria.viscous_step(scene.support, 1.0) * (1.0 + 1e-6)  # [m^2]
         blocks = grid.geometry.blocks
         self.blocks = blocks
@@ -192,6 +189,13 @@ class AsynchronousSchedule(Schedule):
         self.reads_are_slow = backend.current().arch != "cpu"
         self.seen_widths: list[np.ndarray] = []
         self.all_wakes = self.all_clamped = 0
+
+    def retime(self, stepper: Asynchronous, timeline: Timeline) -> bool:
+        """Take another courant; the number of ticks in the longest step is compiled in."""
+        self.stepper = stepper
+        self.tick = timeline.tick
+        self.fast_reach = (1.0 + criteria.MACH) * stepper.longest_courant * self.scene.support  # [m]
+        return stepper.ticks(self.scene) == self.levels
 
     # -- what the host decides: cycles ------------------------------------------------------------------------------
 
@@ -248,14 +252,15 @@ class AsynchronousSchedule(Schedule):
     @ti.kernel
     def find_drift_time(self, now: ti.i32, tick: float):
         """The shortest time [s] from `now` in which |v| t + |a| t^2/2 of some particle is all the drift that the grid allows."""
-        self.drift_time[None] = self.levels * self.tick
+        longest = self.levels * tick
+        self.drift_time[None] = longest
         for i in range(self.particles.alive[None]):
             a = self.particles.a[i].norm()
             elapsed = ti.cast(now - self.particles.updated[i], float) * tick
             v = (self.particles.v[i] + self.particles.a[i] * elapsed).norm()
             drift = ti.static(self.grid.geometry.drift)
             reach = v + ti.sqrt(v * v + 2.0 * a * drift)
-            if reach * ti.static(self.levels * self.tick) > 2.0 * drift:
+            if reach * longest > 2.0 * drift:
                 ti.atomic_min(self.drift_time[None], 2.0 * drift / reach)
 
     def sorted(self, now: int, tick: float) -> None:
@@ -418,7 +423,7 @@ class AsynchronousSchedule(Schedule):
 
     def observe(self, now: int, tick: float) -> None:
         """Give the cells that stepped their next step, and wake neighbours whose step is too long beside it."""
-        self.propose_steps(now, tick)
+        self.propose_steps(now, tick, self.fast_reach)
         self.assign_steps()
         self.wake_neighbours(now)
         self.read_changed_cells()
@@ -426,15 +431,17 @@ class AsynchronousSchedule(Schedule):
         self.find_youngest()
 
     @ti.kernel
-    def propose_steps(self, now: ti.i32, tick: float):
+    def propose_steps(self, now: ti.i32, tick: float, fast_reach: float):
         """The longest step that the CFL condition and the force limit of a cell's particles allow, in ticks."""
         for m in range(self.occupied_count[None]):
             block = self.occupied[m]
             step = self.step[block]
             if self.block_due[block] > 0:
                 time = self.time[block]
-                speed2, acceleration2, viscosity = self.maxima.of(block, time, tick)
-                wanted = self.longest_step(tick, ti.sqrt(speed2), ti.sqrt(acceleration2), viscosity)
+                speed2, acceleration2, viscosity, density = self.maxima.of(block, time, tick)
+                wanted = self.longest_step(
+                    tick, fast_reach, ti.sqrt(speed2), ti.sqrt(acceleration2), viscosity, criteria.stiffening(density)
+                )
                 if ti.static(self.staggered):
                     if step == 0:
                         wanted = 1 + ti.cast(self.noise(block) % ti.cast(wanted, ti.u32), ti.i32)
@@ -446,11 +453,15 @@ class AsynchronousSchedule(Schedule):
             self.proposal[block] = step
 
     @ti.func
-    def longest_step(self, tick, speed, acceleration, viscosity):
-        """Smallest of the CFL limit with |v|, the force and viscous limits and the longest step, rounded down to >= 1 tick."""
+    def longest_step(self, tick, fast_reach, speed, acceleration, viscosity, stiffening):
+        """Smallest of the CFL limit, the force and viscous limits and the longest step, rounded down to >= 1 tick.
+
+        The CFL limit is `fast_reach` [m] over the sum of |v| and the local sound speed `stiffening` c_s.
+        """
         step = ti.cast(self.levels, float)
-        if speed > self.slow_speed:
-            step = ti.min(step, self.fast_reach / ((self.scene.wave_speed + speed) * tick))
+        if speed > self.slow_speed or stiffening > 1.0:
+            signal = criteria.signal_speed(self.scene.wave_speed, stiffening, ti.max(speed, self.slow_speed))
+            step = ti.min(step, fast_reach / (signal * tick))
         if acceleration > 0.0:
             step = ti.min(step, self.stepper.lambda_f * ti.sqrt(self.scene.support / acceleration) / tick)
         if viscosity > 0.0:

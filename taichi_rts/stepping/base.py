@@ -97,6 +97,13 @@ class Schedule:
     def observe(self, now: int, tick: float) -> None:
         """Look at the state after a step, to choose the next."""
 
+    def retime(self, stepper: Any, timeline: Timeline) -> bool:
+        """Take another courant, before the first step: `stepper` has it and else equals the present one.
+
+        Returns whether the compiled kernels serve for it.
+        """
+        return True
+
     def take_counts(self) -> tuple[list[int], list[int]]:
         """Return particles and updates per level, each summed over the steps since the last call, and forget them.
 

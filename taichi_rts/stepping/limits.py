@@ -1,4 +1,4 @@
-"""What limits the step of a block: the largest speed, acceleration and viscosity that its particles and walls nearby have."""
+"""What limits the step of a block: the largest speed, acceleration, viscosity and density of its particles and walls nearby."""
 
 import taichi as ti
 
@@ -17,37 +17,44 @@ class BlockMaxima:
         self.grid = grid
         self.geometry = grid.geometry
         self.viscosity = max(scene.viscosities)
+        self.rest_density = scene.rest_density
         self.walls = [
-            (face_axis(wall.face), face_position(wall.face, scene.domain), displacement, max(map(abs, wall.velocities)))
+            (
+                face_axis(wall.face),
+                face_position(wall.face, scene.domain) + min(wall.displacements),
+                face_position(wall.face, scene.domain) + max(wall.displacements),
+                max(map(abs, wall.velocities)),
+            )
             for wall in scene.moving_walls
-            for displacement in [(min(wall.displacements), max(wall.displacements))]
         ]
 
     @ti.func
     def of(self, block, now, tick):
         """Squares of the largest speed [m/s] and acceleration [m/s^2], and the largest viscosity [m^2/s], at tick `now`.
 
+        And the largest density of all last evaluations, over the rest density.
         A face that moves counts with its largest speed in all blocks that it or the fluid beside it may reach: fluid at rest
         must not be stepped over by a wall that starts to move.
         """
-        speed2, acceleration2, viscosity = 0.0, 0.0, 0.0
+        speed2, acceleration2, viscosity, density = 0.0, 0.0, 0.0, 0.0
         for k in range(self.grid.first(block), self.grid.first(block + 1)):
             i = self.grid.order[k]
             a = self.particles.a[i]
             v = self.particles.v[i] + a * (ti.cast(now - self.particles.updated[i], float) * tick)
             speed2 = ti.max(speed2, v.norm_sqr())
             acceleration2 = ti.max(acceleration2, a.norm_sqr())
+            density = ti.max(density, self.particles.rho[i])
             if ti.static(self.particles.has_viscosity):
                 viscosity = ti.max(viscosity, self.particles.viscosity[i])
         if ti.static(not self.particles.has_viscosity):
             viscosity = self.viscosity
         for wall in ti.static(self.walls):
-            axis, face, (least, most), speed = ti.static(wall)
+            axis, least, most, speed = ti.static(wall)
             side = ti.static(self.geometry.sides[axis])
             low = self.lower(block, axis)
-            if face + least < low + 2.0 * side and low - side < face + most:
+            if least < low + 2.0 * side and low - side < most:
                 speed2 = ti.max(speed2, speed * speed)
-        return speed2, acceleration2, viscosity
+        return speed2, acceleration2, viscosity, density / self.rest_density
 
     @ti.func
     def lower(self, block, axis: ti.template()):

@@ -29,7 +29,8 @@ class Uniform:
     Attributes:
         courant: lambda = dt c_s / r.
         integrator: "serna" (predictor-corrector, second order) or "symplectic_euler".
-        adaptive: shorten each step to what c_s + |v| and the largest acceleration allow, over all particles.
+        adaptive: shorten each step to what c + |v| and the largest acceleration allow, over all particles; c is the sound speed
+            of water as compressed as it is there.
         lambda_f: factor of the force limit (Eq. 2), used if adaptive.
     """
 
@@ -86,19 +87,28 @@ class AdaptiveSchedule(UniformSchedule):
         self, stepper: Uniform, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline
     ) -> None:
         super().__init__(particles, grid)
-        self.stepper = stepper
         self.scene = scene
-        self.tick = timeline.tick
+        self.retime(stepper, timeline)
         self.base_ticks = SUBDIVISIONS
-        self.speed2 = ti.field(float, ())
+        self.sound_speed = scene.wave_speed
+        self.rest_density = scene.rest_density
+        self.signal = ti.field(float, ())
         self.acceleration2 = ti.field(float, ())
+
+    def retime(self, stepper: Uniform, timeline: Timeline) -> bool:
+        """Take another courant."""
+        self.stepper = stepper
+        self.tick = timeline.tick
+        return True
 
     @ti.kernel
     def reduce_maxima(self):
-        self.speed2[None] = 0.0
+        self.signal[None] = self.sound_speed
         self.acceleration2[None] = 0.0
         for i in range(self.particles.alive[None]):
-            ti.atomic_max(self.speed2[None], self.particles.v[i].norm_sqr())
+            stiffening = criteria.stiffening(self.particles.rho[i] / self.rest_density)
+            speed = self.particles.v[i].norm()
+            ti.atomic_max(self.signal[None], criteria.signal_speed(self.sound_speed, stiffening, speed))
             ti.atomic_max(self.acceleration2[None], self.particles.a[i].norm_sqr())
 
     def observe(self, now: int, tick: float) -> None:
@@ -106,12 +116,12 @@ class AdaptiveSchedule(UniformSchedule):
         self.reduce_maxima()
 
     def next_ticks(self) -> int:
-        """Ticks of the next step: the smallest of Eq. 1 with c_s + |v|, Eq. 2 and the fixed step."""
-        speed, acceleration = math.sqrt(self.speed2[None]), math.sqrt(self.acceleration2[None])
-        speed = max(speed, *(abs(v) for wall in self.scene.moving_walls for v in wall.velocities), 0.0)
+        """Ticks of the next step: the smallest of Eq. 1 with c + |v|, Eq. 2 and the fixed step."""
+        signal, acceleration = self.signal[None], math.sqrt(self.acceleration2[None])
+        walls = [self.sound_speed + abs(v) for wall in self.scene.moving_walls for v in wall.velocities]
         support = self.scene.support
         step = min(
-            criteria.advective_step(self.stepper.courant, support, self.scene.wave_speed, speed),
+            criteria.acoustic_step(self.stepper.courant, support, max(signal, *walls, 0.0)),
             criteria.force_step(self.stepper.lambda_f, support, acceleration),
         )
         return max(1, min(self.base_ticks, math.floor(step / self.tick))) if math.isfinite(step) else 1

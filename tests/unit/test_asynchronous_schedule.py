@@ -7,7 +7,7 @@ import pytest
 
 import taichi_rts as rts
 from taichi_rts.grid import CELLS_PER_BLOCK
-from taichi_rts.stepping.asynchronous import MACH
+from taichi_rts.stepping.criteria import MACH
 
 POOL, JET = rts.Block((0, 0), (1, 0.5)), rts.Block((1.1, 0.1), (1.5, 0.3), velocity=(-12, 0))
 SCENE = rts.Scene(domain=rts.Box((0, 0), (2, 0.8)), fluids=[POOL, JET], spacing=0.04, sound_speed=32)
@@ -163,7 +163,7 @@ def test_the_due_move_to_their_cells_time_and_the_others_stay(recorded):
 def test_steps_obey_the_cells_limits(recorded):
     sim, passes = recorded
     stepper, tick, support, c = sim.stepper, sim.timeline.tick, SCENE.support, SCENE.wave_speed
-    taken = set()
+    taken, compressed = set(), 0
     for one in passes:
         new = one["after"]
         for block in np.unique(one["block"][one["due"]]):
@@ -174,8 +174,11 @@ def test_steps_obey_the_cells_limits(recorded):
             speed = np.linalg.norm(new["v"][inside] + new["a"][inside] * dt, axis=1).max()
             force = np.linalg.norm(new["a"][inside], axis=1).max()
             allowed = [stepper.lambda_f * np.sqrt(support / force) / tick, stepper.levels]
-            if speed > MACH * c:
-                allowed.append((1 + MACH) * stepper.longest_courant * support / (c + speed) / tick)
+            stiffening = max(1.0, (new["rho"][inside].max() / SCENE.rest_density) ** 3 - MACH)
+            if speed > MACH * c or stiffening > 1.0:
+                signal = stiffening * c + max(speed, MACH * c)
+                allowed.append((1 + MACH) * stepper.longest_courant * support / signal / tick)
+                compressed += stiffening > 1.0
             step = new["level"][due]
             assert step.max() <= max(1, np.floor(min(allowed) * (1 + 1e-9)))
             assert step.min() >= 1
@@ -186,6 +189,7 @@ def test_steps_obey_the_cells_limits(recorded):
             if stepper.limiter:
                 assert step.max() <= 2 * before
     assert len(taken) >= 3
+    assert compressed > 0
 
 
 def test_neighbours_are_limited_and_woken(recorded):

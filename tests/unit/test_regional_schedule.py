@@ -78,6 +78,22 @@ def test_levels_follow_eq_2_and_3_from_block_maxima(recorded):
     assert {1, 2} <= met
 
 
+def test_compressed_blocks_step_as_far_as_their_sound_allows(recorded):
+    levels = {}
+    for local_sound in (True, False):
+        scene = SCENE.replace(fluids=[POOL], gravity=(0, -1e-6))
+        sim = rts.Simulation(scene, rts.Regional(levels=3, limiter=False, local_sound=local_sound))
+        left = sim.particles.x.to_numpy()[:, 0] < 0.5
+        sim.particles.rho.from_numpy(np.where(left, 1.3, 1.02) * scene.rest_density)
+        sim.particles.a.fill(0.0)
+        sim.schedule.select(1, sim.base_step)
+        levels[local_sound] = sim.schedule.raw_level.to_numpy()
+        hit = np.unique(sim.grid.cell_of.to_numpy()[left] // CELLS_PER_BLOCK)
+    assert set(levels[False]) == {3, EMPTY}
+    assert set(levels[True][hit]) == {1}  # 3 / (1.3^3 - 0.1) base steps of the 3 that c_s allows
+    assert set(np.delete(levels[True], hit)) == {3, EMPTY}
+
+
 def test_no_block_misses_the_minimum_region(recorded):
     sim, steps = recorded
     for step in steps:
