@@ -18,10 +18,11 @@ class BlockMaxima:
         self.geometry = grid.geometry
         self.viscosity = max(scene.viscosities)
         self.walls = [
-            (face_axis(wall.face), face_position(wall.face, scene.domain), displacement, max(map(abs, wall.velocities)))
+            (face_axis(wall.face), face + min(wall.displacements), face + max(wall.displacements), wall.top_speed)
             for wall in scene.moving_walls
-            for displacement in [(min(wall.displacements), max(wall.displacements))]
+            for face in [face_position(wall.face, scene.domain)]
         ]
+        """Axis, range of places [m] and largest speed [m/s] of each moving face."""
 
     @ti.func
     def of(self, block, now, tick):
@@ -42,11 +43,10 @@ class BlockMaxima:
         if ti.static(not self.particles.has_viscosity):
             viscosity = self.viscosity
         for wall in ti.static(self.walls):
-            axis, face, (least, most), speed = ti.static(wall)
-            side = ti.static(self.geometry.sides[axis])
-            low = self.lower(block, axis)
-            if face + least < low + 2.0 * side and low - side < face + most:
-                speed2 = ti.max(speed2, speed * speed)
+            low = self.lower(block, wall[0])
+            if wall[1] < low + ti.static(2.0 * self.geometry.sides[wall[0]]):
+                if low - ti.static(self.geometry.sides[wall[0]]) < wall[2]:
+                    speed2 = ti.max(speed2, wall[3] * wall[3])
         return speed2, acceleration2, viscosity
 
     @ti.func

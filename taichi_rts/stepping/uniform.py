@@ -108,7 +108,7 @@ class AdaptiveSchedule(UniformSchedule):
     def next_ticks(self) -> int:
         """Ticks of the next step: the smallest of Eq. 1 with c_s + |v|, Eq. 2 and the fixed step."""
         speed, acceleration = math.sqrt(self.speed2[None]), math.sqrt(self.acceleration2[None])
-        speed = max(speed, *(abs(v) for wall in self.scene.moving_walls for v in wall.velocities), 0.0)
+        speed = max([speed, *(wall.top_speed for wall in self.scene.moving_walls)])
         support = self.scene.support
         step = min(
             criteria.advective_step(self.stepper.courant, support, self.scene.wave_speed, speed),
