@@ -78,6 +78,11 @@ class MovingWall:
         """Velocities [m/s], (K-1,), between the times."""
         return tuple((np.diff(self.displacements) / np.diff(self.times)).tolist())
 
+    @property
+    def top_speed(self) -> float:
+        """Largest speed [m/s]."""
+        return max(map(abs, self.velocities))
+
     def displacement(self, time: float) -> float:
         """Displacement [m] at `time` [s]."""
         return float(np.interp(time, self.times, self.displacements))

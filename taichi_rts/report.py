@@ -70,7 +70,8 @@ def print_table(sim: Simulation, initial_energy: Energy, diagnosis: Diagnosis | 
     console.print(levels)
 
     energy = sim.energy()
-    drift = (energy.total - initial_energy.total) / abs(initial_energy.total) if initial_energy.total else 0.0
+    work = sim.work() if sim.keeps_work else 0.0
+    drift = (energy.total - work - initial_energy.total) / abs(initial_energy.total) if initial_energy.total else 0.0
     facts = Table(show_header=False, box=None)
     active, base_steps = statistics["active_fraction"], statistics["base_steps"]
     facts.add_row("active fraction", f"{active:.3f}")
@@ -93,6 +94,10 @@ def print_table(sim: Simulation, initial_energy: Energy, diagnosis: Diagnosis | 
     if statistics.get("extrapolations") is not None:
         facts.add_row("extrapolations", str(statistics["extrapolations"]))
     facts.add_row("energy drift", f"{drift:+.2%} of {initial_energy.total:.4g} J")
+    if work:
+        facts.add_row("work put in", f"{work:+.4g} J, not in the drift")
+    if not sim.keeps_work:
+        facts.add_row("", "with the work of walls and inflows; --debug tells them apart")
     facts.add_row("stopped by the box", f"{statistics['stopped_by_domain']} centres")
     if statistics["runaways"]:
         facts.add_row("[bold red]blown up[/]", f"limited {statistics['runaways']:,} times; use a smaller --courant")

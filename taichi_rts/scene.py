@@ -148,7 +148,7 @@ class Scene:
         its bounding box, or of an inflow, or of a moving wall. After a change of gravity fluid may fall through all of the
         domain; along a periodic axis it falls once around. A body force is left out.
         """
-        walls = [abs(v) for wall in self.moving_walls for v in wall.velocities]
+        walls = [wall.top_speed for wall in self.moving_walls]
         uphill = tuple(-a for a in self.acceleration)
         starts = [(top_speed(fluid), fluid.reach(uphill)) for fluid in self.fluids]
         starts += [(math.hypot(*inflow.velocity), inflow.reach(uphill)) for inflow in self.inflows]

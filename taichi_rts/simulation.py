@@ -273,6 +273,11 @@ class Simulation:
         x, v, rho, _ = self.state()
         return measure_energy(self.scene, self.medium, x, v, rho, self._time)
 
+    @property
+    def keeps_work(self) -> bool:
+        """Whether `work` is known."""
+        return self.particles.has_budget or not (self.scene.moving_walls or self.scene.inflows)
+
     def work(self) -> float:
         """Energy [J] that changes of gravity, moving walls and inflows have put in until `time`.
 
@@ -281,7 +286,7 @@ class Simulation:
         total = self._gravity_work
         p = self.particles
         if self.scene.moving_walls or self.inflows:
-            if not p.has_budget:
+            if not self.keeps_work:
                 raise Error("the work of moving walls and inflows needs Simulation(..., debug=True)")
             elapsed = self._time - p.to_numpy(p.updated) * self.timeline.tick
             done = p.to_numpy(p.work).astype(float) + elapsed * p.to_numpy(p.power)

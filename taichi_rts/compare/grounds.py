@@ -26,6 +26,11 @@ class Ground:
     cached: bool
     threshold: float
 
+    @property
+    def largest_density(self) -> float:
+        """Largest density of the reference at any sample, over rest."""
+        return max(float(rho.max()) for rho in self.reference.densities) / self.scene.rest_density
+
     def facts(self) -> dict[str, Any]:
         """Return what the report says about it."""
         times = self.reference.times

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -15,7 +16,7 @@ from taichi_rts.compare.rewind import Rewind
 from taichi_rts.compare.trajectory import Trajectory
 from taichi_rts.diagnostics import speedup_bound
 from taichi_rts.scene import scene_from
-from taichi_rts.stability.survival import largest_stable, watch
+from taichi_rts.stability.survival import demanded_density, largest_stable, watch
 from taichi_rts.stepping.base import Stepper
 
 STEPPERS: dict[str, Any] = {kind.name: kind for kind in (rts.Uniform, rts.Regional, rts.Asynchronous)}
@@ -28,8 +29,8 @@ class Job:
 
     `scene` as `Scene.to_dict` gives it, whose end time is where the run ends; `stepper` as `stepper_data` does; the number of
     equal intervals `samples` at whose ends the state is read; the device `arch` and `precision`; how many times the run is timed;
-    and whether it is a
-    reference, which is followed whatever its largest density.
+    whether it is a reference, which is followed whatever its largest density; and for others `density`, the largest that the
+    reference has, over rest.
     """
 
     scene: dict[str, Any]
@@ -39,6 +40,15 @@ class Job:
     precision: str = "f32"
     repeats: int = 1
     reference: bool = False
+    density: float = 1.0
+
+    @property
+    def demanded_density(self) -> float:
+        """Density over rest that the scene demands: by its speeds and depth, or because the reference has it.
+
+        Single particles overshoot the jump of a shock however short the steps are (docs/stability.md).
+        """
+        return math.inf if self.reference else max(demanded_density(scene_from(self.scene)), self.density)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,7 +86,7 @@ def run(job: Job) -> Outcome:
         scene,
         stepper_from(job.stepper),
         samples=job.samples,
-        demanded_density=math.inf if job.reference else None,
+        demanded_density=job.demanded_density,
         on_sample=follower.look,
     )
     if follower.sim is None:  # it failed before anything could be seen
@@ -146,5 +156,6 @@ def find_largest_stable(job: Job) -> dict[str, Any]:
         scene_from(job.scene),
         lambda courant: cast(Stepper, rts.Uniform(courant=courant)),
         fresh=lambda: rts.init(job.arch, job.precision),
+        run=partial(watch, demanded_density=job.demanded_density),
     )
     return {"stable": bracket.stable, "unstable": bracket.unstable, "reason": bracket.reason}

@@ -110,6 +110,7 @@ class _Comparison:
         self.progress = progress
         self.scenes, self.variants = plan(scene, settings)
         self.cache = settings.cache or references.default_cache()
+        self.densities = [1.0] * len(self.scenes)
 
     def run(self) -> dict[str, Any]:
         """Make references and baselines, then the variants."""
@@ -119,8 +120,9 @@ class _Comparison:
             sum(weight(self.job(variant)) for variant in self.variants)
             + sum(SEARCH * weight(self.stable_job(k)) + sum(map(weight, self.reference(k))) for k in numbers)
         )
-        stable = self.find_stable()
         grounds = self.make_grounds()
+        self.densities = [ground.largest_density for ground in grounds]
+        stable = self.find_stable()
         variants = list(self.variants)
         for number, found in enumerate(stable):
             known = {v.courant for v in variants if v.scene == number and v.family == "uniform" and not v.options}
@@ -137,7 +139,9 @@ class _Comparison:
         """Return the run of a variant as plain data."""
         s = self.settings
         scene = self.scenes[variant.scene][0].to_dict()
-        return Job(scene, variant.stepper, s.samples, s.arch, s.precision, s.repeats)
+        return Job(
+            scene, variant.stepper, s.samples, s.arch, s.precision, s.repeats, density=self.densities[variant.scene]
+        )
 
     def reference(self, number: int) -> tuple[Job, Job]:
         """Return the two reference runs of a scene."""

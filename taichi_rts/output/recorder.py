@@ -119,6 +119,7 @@ def describe_run(sim: Simulation, initial_energy: Any) -> dict[str, Any]:
         "energy": {
             "initial": initial_energy._asdict() | {"total": initial_energy.total},
             "final": energy._asdict() | {"total": energy.total},
+            "work": sim.work() if sim.keeps_work else None,
         },
         "version": version("taichi_rts"),
         "versions": {name: version(name) for name in ("taichi", "numpy")} | {"python": platform.python_version()},

@@ -34,7 +34,6 @@ class MovingFace(Walls):
         times, displacements, velocities = description.times, description.displacements, description.velocities
         self.pieces = list(zip(times, times[1:], displacements, velocities, strict=False))
         self.end = (times[-1], displacements[-1])
-        self.top_speed = max(map(abs, velocities))
         self.shift = ti.field(backend.dtype, fluid.count)
         """Displacement [m] of the frame at the time of the due particle at each place; `speed` [m/s] is its rate."""
         self.speed = ti.field(backend.dtype, fluid.count)

@@ -19,14 +19,11 @@ class BlockMaxima:
         self.viscosity = max(scene.viscosities)
         self.rest_density = scene.rest_density
         self.walls = [
-            (
-                face_axis(wall.face),
-                face_position(wall.face, scene.domain) + min(wall.displacements),
-                face_position(wall.face, scene.domain) + max(wall.displacements),
-                max(map(abs, wall.velocities)),
-            )
+            (face_axis(wall.face), face + min(wall.displacements), face + max(wall.displacements), wall.top_speed)
             for wall in scene.moving_walls
+            for face in [face_position(wall.face, scene.domain)]
         ]
+        """Axis, range of places [m] and largest speed [m/s] of each moving face."""
 
     @ti.func
     def of(self, block, now, tick):
@@ -49,11 +46,10 @@ class BlockMaxima:
         if ti.static(not self.particles.has_viscosity):
             viscosity = self.viscosity
         for wall in ti.static(self.walls):
-            axis, least, most, speed = ti.static(wall)
-            side = ti.static(self.geometry.sides[axis])
-            low = self.lower(block, axis)
-            if least < low + 2.0 * side and low - side < most:
-                speed2 = ti.max(speed2, speed * speed)
+            low = self.lower(block, wall[0])
+            if wall[1] < low + ti.static(2.0 * self.geometry.sides[wall[0]]):
+                if low - ti.static(self.geometry.sides[wall[0]]) < wall[2]:
+                    speed2 = ti.max(speed2, wall[3] * wall[3])
         return speed2, acceleration2, viscosity, density / self.rest_density
 
     @ti.func

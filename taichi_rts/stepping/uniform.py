@@ -118,10 +118,10 @@ class AdaptiveSchedule(UniformSchedule):
     def next_ticks(self) -> int:
         """Ticks of the next step: the smallest of Eq. 1 with c + |v|, Eq. 2 and the fixed step."""
         signal, acceleration = self.signal[None], math.sqrt(self.acceleration2[None])
-        walls = [self.sound_speed + abs(v) for wall in self.scene.moving_walls for v in wall.velocities]
+        walls = [self.sound_speed + wall.top_speed for wall in self.scene.moving_walls]
         support = self.scene.support
         step = min(
-            criteria.acoustic_step(self.stepper.courant, support, max(signal, *walls, 0.0)),
+            criteria.acoustic_step(self.stepper.courant, support, max([signal, *walls])),
             criteria.force_step(self.stepper.lambda_f, support, acceleration),
         )
         return max(1, min(self.base_ticks, math.floor(step / self.tick))) if math.isfinite(step) else 1

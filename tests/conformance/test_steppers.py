@@ -158,12 +158,14 @@ def test_output_times_do_not_change_the_run(start_taichi, quick, runs, stepper):
         assert sim.statistics["base_steps"] == runs[name].statistics["base_steps"]
 
 
-@pytest.mark.parametrize("name", ["dam_break_2d", "dam_break_3d"])
-def test_one_level_equals_uniform_bit_for_bit(start_taichi, name):
+@pytest.mark.parametrize(
+    ("name", "density"), [("dam_break_2d", "summation"), ("dam_break_3d", "summation"), ("dam_break_2d", "continuity")]
+)
+def test_one_level_equals_uniform_bit_for_bit(start_taichi, name, density):
     states = []
     for same in (rts.Uniform(), rts.Regional(levels=1), rts.Asynchronous(levels=1)):
         with start_taichi("cpu", "f64"):
-            sim = rts.Simulation(PROBLEMS[name].scene, same)
+            sim = rts.Simulation(PROBLEMS[name].scene.replace(density=density), same)
             sim.advance_to(520.5 * sim.base_step)
             assert sim.statistics["base_steps"] == 520
             states.append(sim.state())

@@ -41,9 +41,9 @@ def record_pass(sim):
         seen["youngest"] = int(schedule.youngest[None])
         select(now, tick)
 
-    def watched_update(due, due_count):
+    def watched_update(*due):
         seen["read"] = snapshot(sim)  # what neighbours read, before the due have a new density
-        update(due, due_count)
+        update(*due)
 
     wake = schedule.wake_neighbours
 

@@ -22,9 +22,9 @@ def cloud(dim, seed=0, count=150):
 
 @ti.data_oriented
 class SortedCloud:
-    def __init__(self, x, identity):
+    def __init__(self, x, identity, periodic=None):
         self.count, dim = x.shape
-        self.geometry = Geometry((-0.1,) * dim, (0.8,) * dim, SUPPORT)
+        self.geometry = Geometry((-0.1,) * dim, (0.8,) * dim, SUPPORT, periodic=periodic)
         self.grid = BlockGrid(self.geometry, self.count)
         self.x = vector_field(dim, ti.f64, self.count)
         self.sorted = vector_field(dim, ti.f64, self.count + CPU.lanes)
@@ -113,3 +113,67 @@ def test_place_catches_what_is_not_a_number(taichi_cpu_f64):
     assert np.isfinite(x).all()
     assert (x[3] >= 0).all()
     assert (x[3] <= [1, 2]).all()
+
+
+@pytest.mark.parametrize(("dim", "periodic"), [(2, (1, 0)), (2, (0, 1)), (2, (1, 1)), (3, (1, 0, 1)), (3, (0, 1, 1))])
+def test_neighbours_are_found_across_periodic_faces(taichi_cpu_f64, dim, periodic):
+    x = cloud(dim)
+    cloud_ = SortedCloud(x, np.arange(len(x)), periodic)
+    geometry = cloud_.geometry
+    assert geometry.inside == tuple(3 if around else 4 for around in periodic)
+    kernel = make_kernel("cubic_spline", dim, SUPPORT)
+
+    @ti.kernel
+    def put():
+        for k in range(cloud_.count):
+            cloud_.sorted[k] = geometry.place(cloud_.x[cloud_.grid.order[k]])
+
+    @ti.func
+    def pair(i, j):
+        x_ij = geometry.difference(cloud_.sorted[i], cloud_.sorted[j])
+        return ti.Vector([kernel.value(x_ij.norm()), kernel.value(x_ij.norm()) * x_ij[0]])
+
+    total = make_neighbour_sum(geometry, cloud_.grid.start, pair, 2, CPU)
+
+    @ti.kernel
+    def run(result: ti.types.ndarray()):
+        for k in range(cloud_.count):
+            sums = total(k, cloud_.sorted[k], cloud_.grid.cell_of[cloud_.grid.order[k]])
+            result[k, 0], result[k, 1] = sums[0], sums[1]
+
+    result = np.empty((len(x), 2))
+    put()
+    run(result)
+    y = x[cloud_.grid.order.to_numpy()]
+    x_ij = y[:, None] - y
+    for d in np.flatnonzero(periodic):
+        x_ij[..., d] -= 0.9 * np.round(x_ij[..., d] / 0.9)
+    w = kernel.sample(np.linalg.norm(x_ij, axis=2))
+    np.testing.assert_allclose(result[:, 0], w.sum(axis=1), rtol=1e-11)
+    np.testing.assert_allclose(result[:, 1], (w * x_ij[..., 0]).sum(axis=1), atol=1e-10 * w.max())
+
+
+@pytest.mark.parametrize(("dim", "periodic"), [(2, (0, 0)), (2, (1, 0)), (3, (0, 1, 1))])
+def test_blocks_beside_are_those_across_periodic_faces(taichi_cpu_f64, dim, periodic):
+    geometry = Geometry((0,) * dim, (1,) * dim, SUPPORT, periodic=periodic)
+    count = len(geometry.offsets)
+    found = np.zeros((geometry.blocks, count), np.int32)
+
+    @ti.kernel
+    def run(result: ti.types.ndarray()):
+        for block in range(geometry.blocks):
+            for k in ti.static(range(count)):
+                result[block, k] = geometry.beside(block, k)
+
+    run(found)
+    inside = np.stack(np.meshgrid(*[np.arange(1, n + 1) for n in geometry.inside], indexing="ij"), -1).reshape(-1, dim)
+    strides = np.array(geometry.block_strides)
+    for place in inside:
+        for k, offset in enumerate(geometry.offsets):
+            other = place + offset
+            wrapped = np.where(periodic, (other - 1) % geometry.inside + 1, other)
+            assert found[place @ strides, k] == wrapped @ strides
+    flags = np.zeros(geometry.blocks, bool)
+    flags[inside[0] @ strides] = True
+    spread = geometry.spread(flags)
+    assert all(spread[block] == (flags[block] or flags[found[block]].any()) for block in inside @ strides)

@@ -27,6 +27,8 @@ def simulation(stepper, particles, updates, **more):
         scene=rts.load_scene("dam_break"),
         schedule=SimpleNamespace(levels_double=stepper.name == "asynchronous"),
         keeps_momentum_budget=False,
+        keeps_work=True,
+        work=lambda: 0.0,
         base_step=0.0005,
         statistics=statistics,
         energy=lambda: Energy(1.0, 2.0, 0.5),

@@ -114,3 +114,15 @@ def test_order_of_convergence(start_taichi):
     assert orders["asynchronous"] > 1.7
     assert 0.8 < orders["regional"] < 1.7
     assert 0.8 < orders["stale"] < 1.5
+
+
+def test_order_of_convergence_with_an_integrated_density(start_taichi):
+    scene = rts.load_scene("oscillating_drop", spacing=0.125, density="continuity")
+    with start_taichi("cpu", "f64"):
+        found = []
+        for courant in (0.4, 0.1, 0.1 / 16):
+            sim = rts.Simulation(scene, rts.Uniform(courant=courant))
+            sim.advance_to(0.2)
+            found.append(sim.velocities())
+    coarse, fine = (np.linalg.norm(v - found[-1]) for v in found[:2])
+    assert np.log2(coarse / fine) / 2 > 1.7
