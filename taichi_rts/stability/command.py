@@ -39,6 +39,8 @@ class Stability:
     """How close the largest stable and the smallest unstable courant have to be, relative to each other."""
     quick: bool = False
     """Only say whether each stepper survives at its default courant."""
+    workers: int = 1
+    """How many processes to use; each does whole cases."""
     resume: bool = False
     """Keep the cells that an earlier call with the same options stored in the output folder."""
     overwrite: bool = False
@@ -59,6 +61,8 @@ class Stability:
         cases = choose("case", self.cases, CASES)
         settings = choose("stepper", self.steppers, SETTINGS)
         plan = Plan(cases, settings, self.tolerance, self.quick, self.arch, self.precision)
+        if self.workers < 1:
+            raise OutputError(f"workers {self.workers} is below 1; use 1, or as many as there are idle processors")
         draws = self.plot and not self.quick
         if draws:
             chart.require_matplotlib()
@@ -78,12 +82,14 @@ class Stability:
         columns = [TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()]
         with Progress(*columns, console=console) as bar:
             task = bar.add_task("", total=len(plan.cells))
-            for cell in run_plan(plan, self.output_dir, lambda what: bar.update(task, description=what)):
+            for cell in run_plan(plan, self.output_dir, lambda what: bar.update(task, description=what), self.workers):
                 cells.append(cell)
                 bar.advance(task)
 
     def write(self, plan: Plan, cells: Sequence[Cell], draws: bool) -> None:
         """Print the map and write it, as far as it is done."""
+        order = {(case.name, setting.name): place for place, (case, setting) in enumerate(plan.cells)}
+        cells = sorted(cells, key=lambda cell: order[cell.case, cell.setting])
         width = max(
             console.width, 40 + 14 * len(plan.settings)
         )  # a narrow terminal had better wrap lines than cut numbers

@@ -7,11 +7,13 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import as_completed
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import taichi_rts as rts
+from taichi_rts.compare.executors import processes
 from taichi_rts.output.files import write_json
 from taichi_rts.stability.cases import Case
 from taichi_rts.stability.demands import demanded_density
@@ -118,21 +120,41 @@ class Cell:
         return cls(**(data | {"outcome": Outcome(**data["outcome"]), "runs": tuple(data["runs"])}))
 
 
-def run_plan(plan: Plan, folder: Path, on_cell: Callable[[str], None]) -> Iterator[Cell]:
+def run_plan(plan: Plan, folder: Path, on_cell: Callable[[str], None], workers: int = 1) -> Iterator[Cell]:
     """Yield all cells: from `folder` where they are stored there under the same key, else run and stored.
 
-    `on_cell` is told what comes next.
+    `on_cell` is told what comes next. With several `workers` each case is done by one process, and cells come as cases are done.
     """
-    for case, setting in plan.cells:
-        on_cell(f"{case.name} with {setting.name}")
-        path, key = folder / "cells" / f"{case.name}--{setting.name}.json", plan.key(case, setting)
-        stored = _read(path, key)
-        if stored is None:
-            cell = run_cell(plan, case, setting, _demanded(plan, case, folder))
-            write_json(path, {"key": key, "cell": cell.plain()})
-        else:
-            cell = Cell.load(stored["cell"])
-        yield cell
+    if workers == 1:
+        for case, setting in plan.cells:
+            on_cell(f"{case.name} with {setting.name}")
+            yield stored_cell(plan, case, setting, folder)
+        return
+    with processes(workers) as pool:
+        names = tuple(setting.name for setting in plan.settings)
+        parts = [dataclasses.replace(plan, cases=(case,), settings=()) for case in plan.cases]
+        futures = {pool.submit(_run_part, part, names, folder): part.cases[0].name for part in parts}
+        on_cell(f"{len(parts)} cases in {workers} processes")
+        for future in as_completed(futures):
+            on_cell(f"{futures.pop(future)} is done")
+            yield from future.result()
+
+
+def _run_part(part: Plan, names: Sequence[str], folder: Path) -> list[Cell]:
+    """Run a plan in a process of its own; settings come by name, because functions without one cannot be sent."""
+    settings = [setting for setting in SETTINGS if setting.name in names]
+    return list(run_plan(dataclasses.replace(part, settings=settings), folder, lambda what: None))
+
+
+def stored_cell(plan: Plan, case: Case, setting: Setting, folder: Path) -> Cell:
+    """Return a cell from `folder`, where it is put if it is not there."""
+    path, key = folder / "cells" / f"{case.name}--{setting.name}.json", plan.key(case, setting)
+    stored = _read(path, key)
+    if stored is not None:
+        return Cell.load(stored["cell"])
+    cell = run_cell(plan, case, setting, _demanded(plan, case, folder))
+    write_json(path, {"key": key, "cell": cell.plain()})
+    return cell
 
 
 def run_cell(plan: Plan, case: Case, setting: Setting, demanded: float) -> Cell:

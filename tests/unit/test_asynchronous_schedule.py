@@ -240,7 +240,7 @@ def test_who_drifts_too_far_ends_the_cycle(recorded):
     """No pair within the support radius is missed: nobody leaves the place it was sorted in by more than the drift."""
     sim, passes = recorded
     geometry = sim.grid.geometry
-    assert geometry.side >= SCENE.support + 2 * geometry.drift
+    assert min(geometry.sides) >= SCENE.support + 2 * geometry.drift
     start = None
     for one in passes:
         state = one["before"]
