@@ -185,7 +185,7 @@ CASES: tuple[Case, ...] = (
     Case("gap", "drop through a gap of 3 particles", drop_in_gap),
     Case("viscous_blob", "very viscous blob in thin water", viscous_blob),
     Case("piston", "wall that starts to move at Mach 0.1", piston, shocks=True),
-    Case("gravity_flip", "gravity that flips", gravity_flip),
+    Case("gravity_flip", "gravity that flips", gravity_flip, shocks=True),
     Case("tiny", "dam break with a spacing of 1e-4 m", partial(dam, 1e-4)),
     Case("huge", "dam break with a spacing of 10 m", partial(dam, 10.0)),
     Case("far", "dam break 1 km from the origin", partial(dam, S, (1000.0, -1000.0))),

@@ -113,6 +113,7 @@ def test_a_stop_keeps_what_is_done(call, monkeypatch):
         (["--cases", "pistn"], ["'pistn'", "did you mean 'piston'", "known"]),
         (["--steppers", "rk4"], ["'rk4'", "asynchronous_integers"]),
         (["--tolerance", "0"], ["tolerance 0", "0.001"]),
+        (["--workers", "0"], ["workers 0", "1"]),
         (["--resume", "--overwrite"], ["--resume", "--overwrite"]),
         (["--arch", "tpu"], ["tpu"]),
     ],
@@ -149,3 +150,9 @@ def test_every_case_is_a_small_scene():
         scene = case.scene
         assert scene.name == case.name
         assert sum(fluid.volume for fluid in scene.fluids) / scene.spacing**scene.dim <= 600
+
+
+def test_several_workers_share_the_cases(call):
+    folder, _ = call("--quick", "--workers", "2")
+    cells = json.loads((folder / "stability.json").read_text())["cells"]
+    assert [(cell["case"], cell["outcome"]["survived"]) for cell in cells] == [("tiny_pool", True)]
