@@ -20,7 +20,7 @@ class Rewind:
 
     def __init__(self, sim: Any) -> None:
         self.fields: list[Any] = []
-        self.owners: list[tuple[dict[str, Any], dict[str, Any]]] = []
+        self.owners: list[tuple[dict[str, Any], dict[str, Any], frozenset[str]]] = []
         self._collect(sim, set())
         self.copies = [_like(each) for each in self.fields]
         self.save()
@@ -28,7 +28,9 @@ class Rewind:
     def restore(self) -> None:
         """Set the simulation back to what it was when this object was made."""
         self.load()
-        for owner, values in self.owners:
+        for owner, values, names in self.owners:
+            for late in [name for name in owner if name not in names]:
+                del owner[late]  # hides what the class says, such as `Schedule.needs_sorting`
             owner.update(copy.deepcopy(values))
 
     @ti.kernel
@@ -57,7 +59,7 @@ class Rewind:
                 self._collect(each, seen)
         elif type(thing).__module__.split(".")[0] == PACKAGE and hasattr(thing, "__dict__"):
             values = {key: copy.deepcopy(value) for key, value in vars(thing).items() if _is_plain(value)}
-            self.owners.append((vars(thing), values))
+            self.owners.append((vars(thing), values, frozenset(vars(thing))))
             for value in vars(thing).values():
                 self._collect(value, seen)
 
