@@ -5,13 +5,9 @@ import taichi_rts as rts
 from taichi_rts.stability import rerun
 from taichi_rts.stability.rerun import Rerun
 
-WALL = rts.MovingWall(face="x-", times=(0.0, 0.05), displacements=(0.0, 0.2))
 POOL, BLOCK = rts.Block((0, 0), (0.8, 0.3)), rts.Block((0.2, 0.35), (0.5, 0.6), velocity=(0, -15))
-SCENE = rts.Scene(
-    domain=rts.Box((0, 0), (0.8, 0.8)), fluids=[POOL, BLOCK], spacing=0.05, sound_speed=40, moving_walls=[WALL]
-)
+SCENE = rts.Scene(domain=rts.Box((0, 0), (0.8, 0.8)), fluids=[POOL, BLOCK], spacing=0.05, sound_speed=40, walls=False)
 STEPPERS = {
-    "adaptive": lambda c: rts.Uniform(courant=c, adaptive=True),
     "regional": lambda c: rts.Regional(courant=c, levels=3),
     "asynchronous": lambda c: rts.Asynchronous(courant=c),
 }
