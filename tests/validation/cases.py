@@ -1,0 +1,192 @@
+"""The validation cases: a scene, when to look at it, and how far it is from an exact solution or an experiment.
+
+`tests/validation/test_cases.py` bounds the errors at a coarse size, `tests/benchmarks/validation.py` prints the table of
+docs/validation.md.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import exact
+import experiments as measured
+import numpy as np
+
+import taichi_rts as rts
+
+
+class Look(NamedTuple):
+    """What a run looks like at `time` [s]: positions [m] and velocities [m/s], (N, dim), and pressures [Pa], (N,)."""
+
+    time: float
+    x: np.ndarray
+    v: np.ndarray
+    p: np.ndarray
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene at two spacings [m], and what is measured of it.
+
+    `times` gives, for the scene, when to look [s]; `errors` makes named errors out of the scene and the looks. The scene is
+    a built-in one with `changes`; `peer` says what others reach.
+    """
+
+    scene_name: str
+    spacings: tuple[float, float]
+    times: Callable
+    errors: Callable
+    changes: dict = field(default_factory=dict)
+    peer: str = ""
+
+    def scene(self, spacing=None):
+        """Return the scene, at the coarser spacing if none is given."""
+        return rts.load_scene(self.scene_name, spacing=spacing or self.spacings[0], **self.changes)
+
+
+def run(case, stepper, spacing=None, **wrong):
+    """Return the errors of a run and its statistics; `wrong` changes the run's scene, but not what it is compared with."""
+    scene = case.scene(spacing)
+    sim = rts.Simulation(scene.replace(**wrong), stepper)
+    looks = []
+    for time in case.times(scene):
+        sim.advance_to(time)
+        looks.append(Look(time, sim.positions().astype(float), sim.velocities().astype(float), sim.pressures()))
+    return case.errors(scene, looks), sim.statistics
+
+
+def parts(number, start=0.0):
+    """Return a function that cuts the scene's time from `start` times its end into `number` equal parts."""
+    return lambda scene: scene.end_time * (start + (1.0 - start) * np.arange(1, number + 1) / number)
+
+
+def relative_l2(found, expected):
+    """Relative L2 norm of the difference."""
+    return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
+
+
+def drop_errors(frequency):
+    """Largest relative error of the semi-axes over all looks, and that of the axes at the last."""
+
+    def errors(scene, looks):
+        times = np.array([look.time for look in looks])
+        axes = np.stack(exact.drop_axes(times, scene.fluids[0].velocity.gradient[0][0], frequency), axis=1)
+        found = np.array([2.0 * np.sqrt((look.x**2).mean(axis=0)) for look in looks])
+        off = np.abs(found / axes - 1.0)
+        return {"axes": float(off.max()), "axes at the end": float(off[-1].max())}
+
+    return errors
+
+
+def pressure_error(scene, looks):
+    """Mean over the looks of the relative L2 error of p = rho g (H - z)."""
+    depth = scene.fluids[0].upper[1]
+
+    def error(look):
+        expected = scene.rest_density * measured.G * np.maximum(depth - look.x[:, 1], 0.0)
+        return relative_l2(look.p, expected)
+
+    return {"pressure": float(np.mean([error(look) for look in looks]))}
+
+
+def vortex_errors(scene, looks):
+    """Largest error of the rms speed over its start's, and relative L2 error of the velocities at the last look."""
+    k = 2.0 * math.pi / scene.fluids[0].velocity.wavelength
+    decay = [math.exp(-2.0 * scene.kinematic_viscosity * k * k * look.time) for look in looks]
+    start = 0.5 * scene.fluids[0].velocity.speed ** 2
+    speeds = np.sqrt([(look.v**2).sum(axis=1).mean() / start for look in looks])
+    last = scene.fluids[0].velocity.at(looks[-1].x) * decay[-1]
+    return {"speed": float(np.abs(speeds / decay - 1.0).max()), "velocities": relative_l2(looks[-1].v, last)}
+
+
+def poiseuille_errors(scene, looks):
+    """Largest error of the velocity along the channel over its steady maximum, at all looks, and at the last relative L2."""
+    force, nu = scene.acceleration[0], scene.kinematic_viscosity
+    profiles = [exact.poiseuille(look.x[:, 1], look.time, force, nu) for look in looks]
+    worst = max(np.abs(look.v[:, 0] - u).max() for look, u in zip(looks, profiles, strict=True))
+    return {
+        "velocity, largest": float(worst / (force / (8.0 * nu))),
+        "velocity, start-up": relative_l2(looks[0].v[:, 0], profiles[0]),
+        "velocity, steady": relative_l2(looks[-1].v[:, 0], profiles[-1]),
+    }
+
+
+def wave_errors(scene, looks):
+    """Relative errors of period and amplitude of the surface's first mode.
+
+    The mode is read from all particles, 2 <y cos kx>: the mean of y over a column of height h is h/2, and h cos kx averages to
+    a/2 times the depth. The first crossing of zero after the start is half a period, the next a whole one.
+    """
+    wave = scene.fluids[0].velocity
+    k, depth = wave.wavenumber, wave.depth
+    omega = math.sqrt(measured.G * k * math.tanh(k * depth))
+    times = np.array([look.time for look in looks])
+    mode = np.array([2.0 * (look.x[:, 1] * np.cos(k * look.x[:, 0])).mean() for look in looks])
+    down = int(np.argmax((mode[:-1] > 0.0) & (mode[1:] <= 0.0)))
+    up = int(np.argmax((mode[:-1] < 0.0) & (mode[1:] >= 0.0)))
+    crossings = [times[n] - mode[n] * (times[n + 1] - times[n]) / (mode[n + 1] - mode[n]) for n in (down, up)]
+    amplitude = 0.5 * (mode.max() - mode.min()) / (wave.speed / omega)
+    return {"period": abs(float(crossings[1] * omega / (2.0 * math.pi) - 1.0)), "amplitude": abs(float(amplitude - 1.0))}
+
+
+def fall_error(scene, looks):
+    """Largest error of the velocity over that of the fall; positions are second in line, they integrate it."""
+    look = looks[-1]
+    fall = measured.G * look.time
+    return {"velocity": float(np.abs(look.v + np.array([0.0, fall, 0.0])).max() / fall)}
+
+
+def front_error(table, base):
+    """Mean relative error of the front against an experiment's `table`, lengths over `base` [m]."""
+
+    def errors(scene, looks):
+        found = np.array([measured.front(look.x) / base for look in looks])
+        return {"front": float(np.abs(found / table[:, 1] - 1.0).mean()), "front, signed": float((found / table[:, 1] - 1.0).mean())}
+
+    return errors
+
+
+def height_error(scene, looks):
+    """Mean error of the column's height over its first, against Martin & Moyce."""
+    initial = 2.0 * measured.MARTIN_MOYCE_A
+    found = np.array([measured.column_height(look.x, scene.spacing) / initial for look in looks])
+    return {"height": float(np.abs(found - HEIGHT[:, 1]).mean()), "height, signed": float((found - HEIGHT[:, 1]).mean())}
+
+
+def after(table, base, gravities):
+    """Return a function to the times [s] of an experiment's `table`, which are over sqrt(base/(gravities g))."""
+    return lambda scene: table[:, 0] * math.sqrt(base / (gravities * measured.G))
+
+
+HEIGHT = measured.MARTIN_MOYCE_HEIGHT[:-1]
+"""Without the last, when the front has long met the end of the scene's tank."""
+A, L = measured.MARTIN_MOYCE_A, measured.KOSHIZUKA_OKA_L
+TRIXI_DROP = {"density": "continuity", "kernel": "wendland_c2", "support_ratio": 3.0, "sound_speed": 10.0}
+"""As in TrixiParticles.jl's examples/fluid/oscillating_drop_2d.jl, but for the particles' arrangement."""
+JAX_CHANNEL = {"kinematic_viscosity": 100.0, "gravity": (1000.0, 0.0), "sound_speed": 12.5, "end_time": 0.005, "background_pressure": 781.25}
+"""As in JAX-SPH's tests/test_pf2d.py: Re = 0.0125, so that no particle moves by a spacing."""
+
+
+def start_up(scene):
+    """Times [s] at which nu t / d^2 is 0.05, 0.1 and 0.5."""
+    return np.array([0.05, 0.1, 0.5]) / scene.kinematic_viscosity
+
+
+CASES = {
+    "free_fall": Case("free_fall", (0.1, 0.05), lambda scene: [0.3], fall_error),
+    "elliptical_drop": Case("elliptical_drop", (0.1, 0.05), parts(8), drop_errors(0.0)),
+    "oscillating_drop": Case("oscillating_drop", (0.1, 0.05), parts(8), drop_errors(1.0)),
+    "oscillating_drop_trixi": Case("oscillating_drop", (0.1, 0.05), parts(8), drop_errors(1.0), TRIXI_DROP, "2e-4 at 0.05"),
+    "hydrostatic_column": Case("hydrostatic_column", (0.1, 0.05), parts(8, 0.5), pressure_error, {"end_time": 1.5}, "0.045 at 0.05"),
+    "hydrostatic_summation": Case(
+        "hydrostatic_column", (0.1, 0.05), parts(8, 0.5), pressure_error, {"end_time": 1.5, "density": "summation"}, "0.045 at 0.05"
+    ),
+    "taylor_green": Case("taylor_green", (0.05, 0.025), parts(4), vortex_errors),
+    "poiseuille": Case("poiseuille", (0.1, 0.05), start_up, poiseuille_errors, {}, "8e-3 at 1/30"),
+    "poiseuille_jax": Case("poiseuille", (1 / 15, 1 / 30), start_up, poiseuille_errors, JAX_CHANNEL, "8e-3 at 1/30"),
+    "standing_wave": Case("standing_wave", (0.05, 0.025), parts(52), wave_errors, {"end_time": 1.3}),
+    "martin_moyce_front": Case("martin_moyce", (A / 8, A / 16), after(measured.MARTIN_MOYCE_FRONT, A, 2), front_error(measured.MARTIN_MOYCE_FRONT, A)),
+    "martin_moyce_height": Case("martin_moyce", (A / 8, A / 16), after(HEIGHT, A, 1), height_error),
+    "koshizuka_oka": Case("koshizuka_oka", (L / 16, L / 32), after(measured.KOSHIZUKA_OKA_FRONT, L, 2), front_error(measured.KOSHIZUKA_OKA_FRONT, L)),
+}
