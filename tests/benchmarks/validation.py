@@ -18,10 +18,15 @@ from cases import CASES, run
 STEPPERS = {"uniform": rts.Uniform(), "regional": rts.Regional(), "asynchronous": rts.Asynchronous()}
 
 
+ROUNDING = 1e-12
+
+
 def order(errors, spacings):
-    """Observed order of convergence in space."""
+    """Observed order of convergence in space, as text; none where the errors are rounding."""
     first, second = map(abs, errors)
-    return math.log(first / second) / math.log(spacings[0] / spacings[1])
+    if max(first, second) < ROUNDING:
+        return ""
+    return f" ({math.log(first / second) / math.log(spacings[0] / spacings[1]):.1f})"
 
 
 def measure(case):
@@ -44,7 +49,7 @@ def rows(name, case):
         cells = [f"{name}: {error}", " → ".join(f"{spacing:.3g}" for spacing in case.spacings)]
         for stepper in STEPPERS:
             both = [result[error] for result in found.get(stepper, [])]
-            cells.append(f"{both[0]:.2g} → {both[1]:.2g} ({order(both, case.spacings):.1f})" if both else "")
+            cells.append(f"{both[0]:.2g} → {both[1]:.2g}{order(both, case.spacings)}" if both else "")
         print("| " + " | ".join([*cells, case.peers.get(error, "")]) + " |", flush=True)
 
 

@@ -42,5 +42,5 @@ def front(x):
 
 
 def column_height(x, spacing):
-    """Height [m] of the water at the wall x = 0, (N, dim): the third-highest particle of the first two layers, half a spacing up."""
+    """Height [m] of the water at the wall x = 0: half a spacing above the third-highest particle of the first two layers."""
     return np.sort(x[x[:, 0] < 2.0 * spacing, 1])[-3] + 0.5 * spacing
