@@ -22,9 +22,9 @@ ROUNDING = 1e-12
 
 
 def order(errors, spacings):
-    """Observed order of convergence in space, as text; none where the errors are rounding."""
-    first, second = map(abs, errors)
-    if max(first, second) < ROUNDING:
+    """Observed order of convergence in space, as text; none where the errors are rounding or change their sign."""
+    first, second = errors
+    if first * second <= 0.0 or max(abs(first), abs(second)) < ROUNDING:
         return ""
     return f" ({math.log(first / second) / math.log(spacings[0] / spacings[1]):.1f})"
 
