@@ -41,33 +41,34 @@ def test_poiseuille_series():
 
 @pytest.mark.parametrize("stepper", ["uniform", "regional", "asynchronous"])
 def test_hydrostatic_column(errors, stepper):
-    assert errors("hydrostatic_column", stepper)["pressure"] < 0.045
+    assert errors("hydrostatic_column", stepper)["pressure"] < 0.03  # measured 0.020; gravity wrong by 1.1: 0.102
 
 
 @pytest.mark.parametrize("stepper", ["uniform", "paper", "asynchronous"])
 def test_taylor_green(errors, stepper):
     found = errors("taylor_green", stepper)
-    assert found["speed"] < 0.05
-    assert found["velocities"] < 0.08
+    assert found["speed"] < 0.035  # measured 0.025, 0.025, 0.026; viscosity times 1.1: 0.049, over 1.1: 0.097
+    assert found["velocities"] < 0.06  # measured 0.053, 0.053, 0.051; 0.067, 0.109
 
 
 @pytest.mark.parametrize("stepper", ["uniform", "paper", "asynchronous"])
 def test_poiseuille(errors, stepper):
     found = errors("poiseuille", stepper)
-    assert found["velocity, largest"] < 0.03
-    assert found["velocity, start-up"] < 0.03
-    assert found["velocity, steady"] < 0.03
+    assert found["velocity, largest"] < 0.03  # measured 0.013; viscosity wrong by 1.1: 0.076, force: 0.115
+    assert found["velocity, start-up"] < 0.03  # measured 0.010; force: 0.107
+    assert found["velocity, steady"] < 0.03  # measured 0.014; viscosity: 0.075, force: 0.116
 
 
-@pytest.mark.parametrize("stepper", ["uniform", "regional", "asynchronous"])
+@pytest.mark.parametrize("stepper", ["uniform", "paper", "asynchronous"])
 def test_standing_wave(errors, stepper):
+    """Ten particles deep; steppers scatter by more than at the docs' size."""
     found = errors("standing_wave", stepper)
-    assert abs(found["period"]) < 0.03
-    assert -0.1 < found["crest"] < 0.02
+    assert abs(found["period"]) < 0.028  # measured 0.021, -0.001, -0.003; gravity times 1.1: -0.030, over 1.1: 0.070
+    assert -0.12 < found["crest"] < 0.02  # measured -0.064, -0.082, -0.107; speed times 1.1: 0.029
 
 
 @pytest.mark.parametrize("stepper", ["uniform", "paper"])
 def test_koshizuka_oka(errors, stepper):
     found = errors("koshizuka_oka", stepper)
-    assert found["front"] < 0.08
-    assert abs(found["front, signed"]) < 0.05
+    assert found["front"] < 0.07  # measured 0.051, 0.048
+    assert -0.05 < found["front, signed"] < -0.01  # measured -0.030, -0.032; gravity times 1.1: 0.005, over 1.1: -0.064
