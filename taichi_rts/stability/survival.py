@@ -89,8 +89,8 @@ def watch(
     less the work of walls, gravity changes and inflow is at most 5 % of `energy_scale` above the start's.
 
     With `times` [s] it is looked at exactly then, whatever the steps; the energy read between steps is less certain
-    (`sample_times`), and may be twice as much above. `build` takes scene, stepper and `debug` and returns the simulation, by default a new one. Works in any precision, on the
-    backend that was initialised last. Steps do not depend on `samples`.
+    (`sample_times`), and may be twice as much above. `build` takes scene, stepper and `debug` and returns the simulation, by
+    default a new one. Works in any precision, on the backend that was initialised last. Steps do not depend on when it looks.
     """
     demanded = demands.demanded_density(scene) if demanded_density is None else demanded_density
     moving = bool(scene.moving_walls or scene.inflows)
