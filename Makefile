@@ -30,7 +30,7 @@ demo: $(VENV)/.installed
 	$(BIN)/python demos/double_dam_break.py --overwrite
 
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadscope
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .

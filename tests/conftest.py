@@ -7,7 +7,7 @@ import taichi_rts as rts
 from taichi_rts import backend
 
 QUICK = {"advanced_optimization": False}
-"""Compiles a quarter faster. Not where bits of different kernels are compared or results are validated."""
+"""Compiles a quarter faster. Not where bits of different kernels are compared."""
 
 
 @pytest.fixture(scope="session")

@@ -43,6 +43,11 @@ class Job:
     density: float = 1.0
 
     @property
+    def times(self) -> list[float]:
+        """Times [s] at which the state is read: the same for all runs on a scene, whatever their steps."""
+        return [self.scene["end_time"] * k / self.samples for k in range(self.samples + 1)]
+
+    @property
     def demanded_density(self) -> float:
         """Density over rest that the scene demands: by its speeds and depth, or because the reference has it.
 
@@ -85,7 +90,7 @@ def run(job: Job) -> Outcome:
     seen = watch(
         scene,
         stepper_from(job.stepper),
-        samples=job.samples,
+        times=job.times,
         demanded_density=job.demanded_density,
         on_sample=follower.look,
     )
@@ -156,6 +161,6 @@ def find_largest_stable(job: Job) -> dict[str, Any]:
         scene_from(job.scene),
         lambda courant: cast(Stepper, rts.Uniform(courant=courant)),
         fresh=lambda: rts.init(job.arch, job.precision),
-        run=partial(watch, demanded_density=job.demanded_density),
+        run=partial(watch, demanded_density=job.demanded_density, times=job.times),
     )
     return {"stable": bracket.stable, "unstable": bracket.unstable, "reason": bracket.reason}

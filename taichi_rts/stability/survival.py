@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -78,6 +78,7 @@ def watch(
     samples: int = 40,
     demanded_density: float | None = None,
     end_time: float | None = None,
+    times: Sequence[float] | None = None,
     on_sample: Callable[[Simulation], None] | None = None,
     build: Callable[..., Simulation] | None = None,
 ) -> Outcome:
@@ -87,15 +88,16 @@ def watch(
     largest density is at most 1.05 x `demanded_density` (over rest; None: `demands.demanded_density`), and the total energy
     less the work of walls, gravity changes and inflow is at most 5 % of `energy_scale` above the start's.
 
-    `build` takes scene, stepper and `debug` and returns the simulation, by default a new one. Works in any precision, on the
-    backend that was initialised last. Steps do not depend on `samples`.
+    With `times` [s] it is looked at exactly then, whatever the steps; the energy read between steps is less certain
+    (`sample_times`), and may be twice as much above. `build` takes scene, stepper and `debug` and returns the simulation, by
+    default a new one. Works in any precision, on the backend that was initialised last. Steps do not depend on when it looks.
     """
     demanded = demands.demanded_density(scene) if demanded_density is None else demanded_density
     moving = bool(scene.moving_walls or scene.inflows)
     sim = (build or Simulation)(scene, stepper, debug=moving)  # only then is their work added up
-    watcher = _Watcher(sim, DENSITY_MARGIN, demanded)
+    watcher = _Watcher(sim, demanded, ENERGY_MARGIN if times is None else 2.0 * ENERGY_MARGIN)
     end = scene.end_time if end_time is None else end_time
-    for time in sample_times(sim, end, samples):
+    for time in sample_times(sim, end, samples) if times is None else times:
         try:
             sim.advance_to(time)
         except SimulationDivergedError as error:
@@ -188,10 +190,10 @@ def energy_scale(sim: Simulation, start: float, work: float) -> float:
 class _Watcher:
     """Looks at a run at its sample times and keeps the extremes."""
 
-    def __init__(self, sim: Simulation, margin: float, demanded: float) -> None:
+    def __init__(self, sim: Simulation, demanded: float, energy_margin: float) -> None:
         self.sim = sim
-        self.margin = margin
         self.demanded = demanded
+        self.energy_margin = energy_margin
         self.start_count = sim.count
         self.start = sim.energy().total
         self.density = self.speed = self.courant = 0.0
@@ -219,10 +221,10 @@ class _Watcher:
             return f"{self.runaways} speeds or accelerations limited {at}"
         if lost := lost_particles(sim, x, self.start_count):
             return f"{lost} {at}"
-        if density > self.margin * self.demanded:
-            return f"density {density:.3f} of rest {at}, at most {self.margin:g} x {self.demanded:.3f} allowed"
-        if gain > ENERGY_MARGIN:
-            return f"energy {gain:+.1%} {at}, at most {ENERGY_MARGIN:+.0%} of {scale:.3g} J allowed"
+        if density > DENSITY_MARGIN * self.demanded:
+            return f"density {density:.3f} of rest {at}, at most {DENSITY_MARGIN:g} x {self.demanded:.3f} allowed"
+        if gain > self.energy_margin:
+            return f"energy {gain:+.1%} {at}, at most {self.energy_margin:+.0%} of {scale:.3g} J allowed"
         return ""
 
     def outcome(self, reason: str) -> Outcome:

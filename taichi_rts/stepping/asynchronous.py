@@ -24,11 +24,11 @@ from taichi_rts.errors import StepperError
 from taichi_rts.grid import BlockGrid
 from taichi_rts.integrators.serna import Serna
 from taichi_rts.particles import Particles
-from taichi_rts.scan import ExclusiveScan
 from taichi_rts.scene import Positive, Scene
 from taichi_rts.stepping import criteria
 from taichi_rts.stepping.base import Courant, Schedule
-from taichi_rts.stepping.limiter import BlockLimiter, NeighbourLimiter
+from taichi_rts.stepping.cells import Cells
+from taichi_rts.stepping.limiter import NeighbourLimiter
 from taichi_rts.stepping.limits import BlockMaxima
 from taichi_rts.stepping.timeline import Timeline
 from taichi_rts.validation import FROZEN, validated
@@ -123,7 +123,7 @@ class Asynchronous:
 
 
 @ti.data_oriented
-class AsynchronousSchedule(Schedule):
+class AsynchronousSchedule(Cells):
     """Passes: each collects the cells that may step, and after their evaluation gives them their next steps.
 
     Passes come in cycles. A cycle begins at tick `now`, when no particle's last evaluation lies after it and no step ends
@@ -133,54 +133,27 @@ class AsynchronousSchedule(Schedule):
     cell move to one new time, and whose step would have lasted longer ends it there, corrected with the time that elapsed.
     """
 
-    EMPTY = BlockLimiter.EMPTY
     levels_double = True
 
     def __init__(
         self, stepper: Asynchronous, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline
     ) -> None:
-        super().__init__(particles, grid)
+        super().__init__(particles, grid, stepper.ticks(scene))
         self.scene = scene
-        self.levels = stepper.ticks(scene)
         self.retime(stepper, timeline)
         self.maxima = BlockMaxima(scene, particles, grid)
         self.powers_of_two = stepper.steps == "powers_of_two"
         self.staggered = stepper.stagger is not None
         self.seed = stepper.stagger or 0
-        self.beside = BlockLimiter(grid.geometry)
         self.limiter = NeighbourLimiter(doubling=True, aligned=self.powers_of_two)
         self.slow_speed = criteria.MACH * scene.wave_speed
         self.viscous_reach = criteria.viscous_step(scene.support, 1.0) * (1.0 + 1e-6)  # [m^2]
-        blocks = grid.geometry.blocks
-        self.blocks = blocks
-        self.occupied = ti.field(ti.i32, blocks)
-        self.occupied_flag = ti.field(ti.i32, blocks)
-        self.occupied_start = ti.field(ti.i32, blocks + 1)
-        self.occupied_scan = ExclusiveScan(self.occupied_flag, self.occupied_start)
-        self.occupied_count = self.occupied_scan.total
-        self.time = ti.field(ti.i32, blocks)
-        """Tick of each cell: the end of its youngest particle's step; `EMPTY` where there is none."""
-        self.step = ti.field(ti.i32, blocks)
-        """Shortest step [ticks] of each cell's particles."""
-        self.proposal = ti.field(ti.i32, blocks)
-        self.ready = ti.field(ti.i32, blocks)
-        self.claim = ti.field(ti.i32, blocks)
-        self.block_due = ti.field(ti.i32, blocks)
-        self.due_start = ti.field(ti.i32, blocks + 1)
-        self.due_scan = ExclusiveScan(self.block_due, self.due_start)
-        self.due_count = self.due_scan.total
-        self.time.fill(self.EMPTY)
-        self.step.fill(self.EMPTY)
-        self.youngest = ti.field(ti.i32, ())
-        self.stepping = ti.field(ti.i32, ())
         self.drift_time = ti.field(float, ())
         self.passes = ti.field(ti.i32, ())
         self.passes_in_cycle = ti.field(ti.i32, ())
         self.widths = ti.field(ti.i32, LOG)
         self.wakes = ti.field(ti.i32, ())
         self.clamped = ti.field(ti.i32, ())
-        self.extrapolated = ti.field(ti.i32, ())
-        self.updates = ti.field(ti.i32, self.levels + 1)
         self.target = 0
         self.cycle_end = 1  # of the evaluation at tick 0, before which no acceleration is known
         self.cycles = 1
@@ -243,13 +216,6 @@ class AsynchronousSchedule(Schedule):
         return min(self.levels, math.floor(ticks) + 1) if ticks > 0.0 else 1
 
     @ti.kernel
-    def find_youngest(self):
-        """T_min: the earliest time of all cells."""
-        self.youngest[None] = self.EMPTY
-        for m in range(self.occupied_count[None]):
-            ti.atomic_min(self.youngest[None], self.time[self.occupied[m]])
-
-    @ti.kernel
     def find_drift_time(self, now: ti.i32, tick: float):
         """The shortest time [s] from `now` in which |v| t + |a| t^2/2 of some particle is all the drift that the grid allows."""
         longest = self.levels * tick
@@ -266,158 +232,21 @@ class AsynchronousSchedule(Schedule):
     def sorted(self, now: int, tick: float) -> None:
         """Find the occupied cells, their times and steps."""
         self.passes_in_cycle[None] = 0
-        self.forget_cells()
-        self.occupied_scan.run()
-        self.list_occupied()
-        self.read_cells()
-        self.find_youngest()
-
-    @ti.kernel
-    def forget_cells(self):
-        for block in range(self.blocks):
-            self.occupied_flag[block] = ti.cast(self.grid.first(block) < self.grid.first(block + 1), ti.i32)
-            self.time[block] = self.EMPTY
-            self.step[block] = self.EMPTY
-            self.proposal[block] = self.EMPTY
-            self.ready[block] = self.EMPTY
-            self.claim[block] = self.EMPTY
-            self.block_due[block] = 0
-            self.read_at[block] = -1
-
-    @ti.kernel
-    def list_occupied(self):
-        for block in range(self.blocks):
-            if self.occupied_flag[block] == 1:
-                self.occupied[self.occupied_start[block]] = block
-
-    @ti.kernel
-    def read_cells(self):
-        for m in range(self.occupied_count[None]):
-            self.read_cell(self.occupied[m])
-
-    @ti.func
-    def read_cell(self, block):
-        """Take a cell's time and step from its particles."""
-        time, step = self.EMPTY, self.EMPTY
-        for k in range(self.grid.first(block), self.grid.first(block + 1)):
-            i = self.grid.order[k]
-            time = ti.min(time, self.end(i))
-            step = ti.min(step, self.particles.level[i])
-        self.time[block] = time
-        self.step[block] = step
-
-    @ti.func
-    def end(self, i):
-        """Tick at which the step of particle `i` ends."""
-        return self.particles.updated[i] + self.particles.level[i]
-
-    @ti.func
-    def is_due(self, i, time):
-        """Whether particle `i` moves with its cell at `time`: whose step is not over yet ends it there, with what has elapsed.
-
-        Left out is only who was evaluated at that time or later: in a cell that was woken.
-        """
-        return self.particles.updated[i] < time or self.end(i) == time
+        self.find_cells()
 
     # -- before the evaluation: which cells step --------------------------------------------------------------------
 
     def select(self, now: int, tick: float) -> None:
         """Find the cells that may step, the particles due in them, and when each cell near them is read."""
-        self.find_ready(self.target, self.cycle_end)
-        self.claim_neighbourhoods()
-        self.choose_cells()
-        self.due_scan.run()
-        self.list_due()
-        self.mark_read(now)
+        self.choose(now, self.target, self.cycle_end)
         if self.debug:
             self.check(now)
-
-    @ti.kernel
-    def find_ready(self, target: ti.i32, cycle_end: ti.i32):
-        """A cell may step if no neighbour is younger and its own last evaluation does not lie after the youngest of all."""
-        for m in range(self.occupied_count[None]):
-            block = self.occupied[m]
-            time, youngest = self.time[block], self.youngest[None]
-            ready = self.EMPTY
-            if youngest <= target and time < cycle_end and time <= self.beside.shortest_beside(self.time, block):
-                ready = time
-                for k in range(self.grid.first(block), self.grid.first(block + 1)):
-                    i = self.grid.order[k]
-                    if self.is_due(i, time) and self.particles.updated[i] > youngest:
-                        ready = self.EMPTY
-            self.ready[block] = ready
-
-    @ti.kernel
-    def claim_neighbourhoods(self):
-        """Every cell is interpolated to one time in a pass: the youngest of the ready cells around it has the claim."""
-        for m in range(self.occupied_count[None]):
-            block = self.occupied[m]
-            self.claim[block] = ti.min(self.ready[block], self.beside.shortest_beside(self.ready, block))
-
-    @ti.kernel
-    def choose_cells(self):
-        """Ready cells step if their whole neighbourhood is theirs; the others wait for a later pass."""
-        for m in range(self.occupied_count[None]):
-            block = self.occupied[m]
-            time = self.ready[block]
-            due = 0
-            if time != self.EMPTY and time <= self.claim[block]:
-                if time <= self.beside.shortest_beside(self.claim, block):
-                    for k in range(self.grid.first(block), self.grid.first(block + 1)):
-                        due += ti.cast(self.is_due(self.grid.order[k], time), ti.i32)
-            self.block_due[block] = due
-
-    @ti.kernel
-    def list_due(self):
-        """List the places of due particles in the grid's order, and count them by the time that has elapsed."""
-        self.stepping[None] = 0
-        for m in range(self.occupied_count[None]):
-            block = self.occupied[m]
-            if self.block_due[block] > 0:
-                self.stepping[None] += 1
-                n, time = self.due_start[block], self.time[block]
-                elapsed, count = 0, 0
-                for k in range(self.grid.first(block), self.grid.first(block + 1)):
-                    i = self.grid.order[k]
-                    if self.is_due(i, time):
-                        self.due[n] = k
-                        n += 1
-                        if time - self.particles.updated[i] != elapsed:
-                            self.updates[elapsed] += count
-                            elapsed, count = time - self.particles.updated[i], 0
-                        count += 1
-                self.updates[elapsed] += count
-
-    @ti.kernel
-    def mark_read(self, now: ti.i32):
-        """Have the cells read that step or lie beside one that does, at its time."""
-        for m in range(self.occupied_count[None]):
-            block = self.occupied[m]
-            due = self.block_due[block]
-            for k in ti.static(range(len(self.grid.geometry.offsets))):
-                due = ti.max(due, self.block_due[self.grid.geometry.beside(block, k)])
-            self.read_at[block] = self.claim[block] - now if due > 0 else -1
 
     def check(self, now: int) -> None:
         """Debug runs: raise `AssertionError` for a pass in which nobody steps or somebody is extrapolated."""
         self.count_extrapolated(now)
         assert int(self.stepping[None]) > 0, f"no cell may step at tick {int(self.youngest[None])}"
         assert int(self.extrapolated[None]) == 0, f"particles extrapolated near tick {int(self.youngest[None])}"
-
-    @ti.kernel
-    def count_extrapolated(self, now: ti.i32):
-        """Count reads after the end of a particle's step or before its evaluation before the last."""
-        for m in range(self.occupied_count[None]):
-            block = self.occupied[m]
-            if self.read_at[block] >= 0:
-                time = now + self.read_at[block]
-                for k in range(self.grid.first(block), self.grid.first(block + 1)):
-                    i = self.grid.order[k]
-                    begin = self.particles.updated[i]
-                    if ti.static(self.particles.has_past):
-                        begin = ti.min(begin, self.particles.past_updated[i])
-                    if time > self.end(i) or time < begin:
-                        self.extrapolated[None] += 1
 
     # -- after the evaluation: the next steps -----------------------------------------------------------------------
 

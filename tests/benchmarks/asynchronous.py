@@ -6,14 +6,16 @@ python tests/benchmarks/asynchronous.py [checks|projectile|front|momentum|speed 
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 
 import taichi_rts as rts
 
-# Martin & Moyce 1952, n^2 = 2, a = 2.25 in: T = t sqrt(2g/a), Z = x/a
-FRONT = [(0.41, 1.11), (0.84, 1.22), (1.19, 1.44), (1.43, 1.67), (1.63, 1.89), (1.83, 2.11), (1.98, 2.33), (2.20, 2.56)]
-FRONT += [(2.32, 2.78), (2.51, 3.00), (2.65, 3.22), (2.83, 3.44), (2.98, 3.67), (3.11, 3.89), (3.33, 4.11)]
+sys.path.append(str(Path(__file__).parents[1] / "validation"))
+from experiments import MARTIN_MOYCE_A, MARTIN_MOYCE_FRONT
+from experiments import front as front_of
+
 STEPPERS = {
     "uniform 0.4": rts.Uniform(),
     "regional": rts.Regional(),
@@ -108,11 +110,11 @@ def front():
     """Front of Martin & Moyce's dam break: mean relative error."""
     head("stepper", "mean error", "signed", "updates [M]")
     for name, stepper in STEPPERS.items():
-        base, errors = 0.05715, []
+        errors = []
         sim = rts.Simulation(rts.load_scene("martin_moyce"), stepper)
-        for time, place in FRONT:
-            sim.advance_to(time / np.sqrt(2 * 9.81 / base))
-            errors.append(np.sort(sim.positions()[:, 0])[-5] / base / place - 1.0)
+        for time, place in MARTIN_MOYCE_FRONT:
+            sim.advance_to(time / np.sqrt(2 * 9.81 / MARTIN_MOYCE_A))
+            errors.append(front_of(sim.positions()) / MARTIN_MOYCE_A / place - 1.0)
         work = f"{sim.statistics['particle_updates'] / 1e6:.2f}"
         row(name, f"{np.abs(errors).mean():.2%}", f"{np.mean(errors):+.2%}", work)
 

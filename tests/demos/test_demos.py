@@ -17,6 +17,11 @@ COARSE = {
     "double_dam_break_2d": 0.05,
     "elliptical_drop": 0.1,
     "oscillating_drop": 0.1,
+    "hydrostatic_column": 0.05,
+    "taylor_green": 0.05,
+    "poiseuille": 0.05,
+    "standing_wave": 0.05,
+    "koshizuka_oka": 0.0146,
 }
 END = {"martin_moyce": 0.02, "elliptical_drop": 0.0082, "oscillating_drop": 0.5}
 SCENE = {"asynchronous_dam_break": "dam_break"}  # demos that show a scene of another name

@@ -206,21 +206,20 @@ def test_fluid_flows_in_layer_by_layer(taichi_cpu_f64, stepper):
     fountain = scene(inflows=[JET], gravity=(0, 0), sound_speed=30.0)
     layer = len(fill_patch(fountain, JET))
     assert layer == 2
-    sim = rts.Simulation(fountain, stepper, debug=True)
-    pool = sim.count
-    for time in (0.02, 0.06, 0.3):
-        sim.advance_to(time)
-        layers = min(np.floor(time * 3.0 / 0.05 + 0.5), 6)  # 0.1 s at 3 m/s are 6 layers 0.05 apart
-        assert sim.count - pool == 2 * layers == len(sim.positions()) - pool == len(sim.levels()) - pool
-    assert (sim.densities()[pool:] > 500).any()
     jet = rts.Simulation(fountain, stepper, debug=True)
-    jet.advance_to(0.09)
+    pool, start = jet.count, jet.energy().total
+    for time in (0.02, 0.06, 0.09):
+        jet.advance_to(time)
+        layers = np.floor(time * 3.0 / 0.05 + 0.5)
+        assert jet.count - pool == 2 * layers == len(jet.positions()) - pool == len(jet.levels()) - pool
     x, v = jet.positions()[pool:], jet.velocities()[pool:]
     np.testing.assert_allclose(v[-6:], np.tile((0, -3), (6, 1)), atol=1e-12)  # guided for one support radius
     crossed = (np.repeat(np.arange(5), 2) + 0.5) * 0.05 / 3.0
     np.testing.assert_allclose(x[-6:, 1], (1.0 - 3.0 * (0.09 - crossed))[-6:], atol=1e-12)
-    start = rts.Simulation(fountain, stepper).energy().total
     assert jet.energy().total - jet.work() == pytest.approx(start, rel=0.05)
+    jet.advance_to(0.3)
+    assert jet.count - pool == 2 * 6  # 0.1 s at 3 m/s are 6 layers 0.05 apart
+    assert (jet.densities()[pool:] > 500).any()
 
 
 def test_viscosity_belongs_to_the_fluid(taichi_cpu_f64):
@@ -264,8 +263,7 @@ def test_walls_do_not_let_fluid_slip(taichi_cpu_f64):
     quiet = {"gravity": (0, 0), "artificial_viscosity": 0.0, "sound_speed": 20.0}
     for density, ratio, kernel, most in (
         ("continuity", 2.0, "cubic_spline", 1e-8),
-        ("summation", 2.0, "cubic_spline", 0.02),
-        ("continuity", 3.0, "wendland_c2", 0.02),
+        ("summation", 2.5, "wendland_c2", 0.02),
     ):
         flow = rts.LinearField(((0, 1), (0, 0)))
         block = rts.Block((0, 0), (1, 0.5), velocity=flow)

@@ -34,3 +34,16 @@ def _runge_kutta(state, step, frequency):
     k3 = _slope(state + 0.5 * step * k2, frequency)
     k4 = _slope(state + step * k3, frequency)
     return state + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+
+
+def poiseuille(y, time, acceleration, viscosity, width=1.0, terms=50):
+    """Velocity [m/s] at distances `y` [m] from one of two plates `width` [m] apart, `time` [s] after the flow began from rest.
+
+    u = F/(2 nu) y (d - y) - sum_n 4 F d^2/(nu pi^3 (2n+1)^3) sin(pi y (2n+1)/d) exp(-(2n+1)^2 pi^2 nu t/d^2)
+    (Morris, Fox & Zhu 1997, Eq. 36).
+    """
+    odd = (2 * np.arange(terms) + 1)[:, None]
+    scale = acceleration * width**2 / viscosity
+    waves = np.sin(np.pi * odd * np.asarray(y) / width) * np.exp(-((odd * np.pi) ** 2) * viscosity * time / width**2)
+    steady = 0.5 * np.asarray(y) * (width - np.asarray(y)) / width**2
+    return scale * (steady - (4.0 / (np.pi * odd) ** 3 * waves).sum(axis=0))

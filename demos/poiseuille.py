@@ -1,0 +1,12 @@
+"""Flow between two plates starts from rest.
+
+Takes every option of `taichi-rts run`, e.g. --arch cuda --particles 300k --stepper uniform.
+"""
+
+from taichi_rts.cli import run_demo
+
+SCENE = "poiseuille"
+EXPORT_FPS = 10.0  # frames per second of physical time
+
+if __name__ == "__main__":
+    run_demo(SCENE, export_fps=EXPORT_FPS)

@@ -1,0 +1,202 @@
+"""Cells (blocks of the grid) that each have a time: which of them may step together, and who is due in them.
+
+The rule is proved in `asynchronous.py`; this file finds the cells that obey it.
+"""
+
+import taichi as ti
+
+from taichi_rts.grid import BlockGrid
+from taichi_rts.particles import Particles
+from taichi_rts.scan import ExclusiveScan
+from taichi_rts.stepping.base import Schedule
+from taichi_rts.stepping.limiter import BlockLimiter
+
+
+@ti.data_oriented
+class Cells(Schedule):
+    """Times and steps of the occupied cells, and the choice of those that step in one pass.
+
+    `levels` ticks are the longest step.
+    """
+
+    EMPTY = BlockLimiter.EMPTY
+
+    def __init__(self, particles: Particles, grid: BlockGrid, levels: int) -> None:
+        super().__init__(particles, grid)
+        self.levels = levels
+        self.beside = BlockLimiter(grid.geometry)
+        blocks = grid.geometry.blocks
+        self.blocks = blocks
+        self.occupied = ti.field(ti.i32, blocks)
+        self.occupied_flag = ti.field(ti.i32, blocks)
+        self.occupied_start = ti.field(ti.i32, blocks + 1)
+        self.occupied_scan = ExclusiveScan(self.occupied_flag, self.occupied_start)
+        self.occupied_count = self.occupied_scan.total
+        self.time = ti.field(ti.i32, blocks)
+        """Tick of each cell: the end of its youngest particle's step; `EMPTY` where there is none."""
+        self.step = ti.field(ti.i32, blocks)
+        """Shortest step [ticks] of each cell's particles."""
+        self.proposal = ti.field(ti.i32, blocks)
+        self.ready = ti.field(ti.i32, blocks)
+        self.claim = ti.field(ti.i32, blocks)
+        self.block_due = ti.field(ti.i32, blocks)
+        self.due_start = ti.field(ti.i32, blocks + 1)
+        self.due_scan = ExclusiveScan(self.block_due, self.due_start)
+        self.due_count = self.due_scan.total
+        self.youngest = ti.field(ti.i32, ())
+        self.stepping = ti.field(ti.i32, ())
+        self.extrapolated = ti.field(ti.i32, ())
+        self.updates = ti.field(ti.i32, levels + 1)
+        """Updates by the ticks that had elapsed."""
+
+    def find_cells(self) -> None:
+        """Find the occupied cells of a grid that has been sorted anew, their times and steps."""
+        self.forget_cells()
+        self.occupied_scan.run()
+        self.list_occupied()
+        self.read_cells()
+        self.find_youngest()
+
+    @ti.kernel
+    def forget_cells(self):
+        for block in range(self.blocks):
+            self.occupied_flag[block] = ti.cast(self.grid.first(block) < self.grid.first(block + 1), ti.i32)
+            self.time[block] = self.EMPTY
+            self.step[block] = self.EMPTY
+            self.proposal[block] = self.EMPTY
+            self.ready[block] = self.EMPTY
+            self.claim[block] = self.EMPTY
+            self.block_due[block] = 0
+            self.read_at[block] = -1
+
+    @ti.kernel
+    def list_occupied(self):
+        for block in range(self.blocks):
+            if self.occupied_flag[block] == 1:
+                self.occupied[self.occupied_start[block]] = block
+
+    @ti.kernel
+    def read_cells(self):
+        for m in range(self.occupied_count[None]):
+            self.read_cell(self.occupied[m])
+
+    @ti.func
+    def read_cell(self, block):
+        """Take a cell's time and step from its particles."""
+        time, step = self.EMPTY, self.EMPTY
+        for k in range(self.grid.first(block), self.grid.first(block + 1)):
+            i = self.grid.order[k]
+            time = ti.min(time, self.end(i))
+            step = ti.min(step, self.particles.level[i])
+        self.time[block] = time
+        self.step[block] = step
+
+    @ti.func
+    def end(self, i):
+        """Tick at which the step of particle `i` ends."""
+        return self.particles.updated[i] + self.particles.level[i]
+
+    @ti.func
+    def is_due(self, i, time):
+        """Whether particle `i` moves with its cell at `time`: whose step is not over yet ends it there, with what has elapsed.
+
+        Left out is only who was evaluated at that time or later: in a cell that was woken.
+        """
+        return self.particles.updated[i] < time or self.end(i) == time
+
+    @ti.kernel
+    def find_youngest(self):
+        """T_min: the earliest time of all cells."""
+        self.youngest[None] = self.EMPTY
+        for m in range(self.occupied_count[None]):
+            ti.atomic_min(self.youngest[None], self.time[self.occupied[m]])
+
+    def choose(self, now: int, target: int, cycle_end: int) -> None:
+        """Find the cells that may step before tick `cycle_end`, unless all are past `target`; who is due, and what is read."""
+        self.find_ready(target, cycle_end)
+        self.claim_neighbourhoods()
+        self.choose_cells()
+        self.due_scan.run()
+        self.list_due()
+        self.mark_read(now)
+
+    @ti.kernel
+    def find_ready(self, target: ti.i32, cycle_end: ti.i32):
+        """A cell may step if no neighbour is younger and its own last evaluation does not lie after the youngest of all."""
+        for m in range(self.occupied_count[None]):
+            block = self.occupied[m]
+            time, youngest = self.time[block], self.youngest[None]
+            ready = self.EMPTY
+            if youngest <= target and time < cycle_end and time <= self.beside.shortest_beside(self.time, block):
+                ready = time
+                for k in range(self.grid.first(block), self.grid.first(block + 1)):
+                    i = self.grid.order[k]
+                    if self.is_due(i, time) and self.particles.updated[i] > youngest:
+                        ready = self.EMPTY
+            self.ready[block] = ready
+
+    @ti.kernel
+    def claim_neighbourhoods(self):
+        """Every cell is interpolated to one time in a pass: the youngest of the ready cells around it has the claim."""
+        for m in range(self.occupied_count[None]):
+            block = self.occupied[m]
+            self.claim[block] = ti.min(self.ready[block], self.beside.shortest_beside(self.ready, block))
+
+    @ti.kernel
+    def choose_cells(self):
+        """Ready cells step if their whole neighbourhood is theirs; the others wait for a later pass."""
+        for m in range(self.occupied_count[None]):
+            block = self.occupied[m]
+            time = self.ready[block]
+            due = 0
+            if time != self.EMPTY and time <= self.claim[block]:
+                if time <= self.beside.shortest_beside(self.claim, block):
+                    for k in range(self.grid.first(block), self.grid.first(block + 1)):
+                        due += ti.cast(self.is_due(self.grid.order[k], time), ti.i32)
+            self.block_due[block] = due
+
+    @ti.kernel
+    def list_due(self):
+        """List the places of due particles in the grid's order, and count them by the time that has elapsed."""
+        self.stepping[None] = 0
+        for m in range(self.occupied_count[None]):
+            block = self.occupied[m]
+            if self.block_due[block] > 0:
+                self.stepping[None] += 1
+                n, time = self.due_start[block], self.time[block]
+                elapsed, count = 0, 0
+                for k in range(self.grid.first(block), self.grid.first(block + 1)):
+                    i = self.grid.order[k]
+                    if self.is_due(i, time):
+                        self.due[n] = k
+                        n += 1
+                        if time - self.particles.updated[i] != elapsed:
+                            self.updates[elapsed] += count
+                            elapsed, count = time - self.particles.updated[i], 0
+                        count += 1
+                self.updates[elapsed] += count
+
+    @ti.kernel
+    def mark_read(self, now: ti.i32):
+        """Have the cells read that step or lie beside one that does, at its time."""
+        for m in range(self.occupied_count[None]):
+            block = self.occupied[m]
+            due = self.block_due[block]
+            for k in ti.static(range(len(self.grid.geometry.offsets))):
+                due = ti.max(due, self.block_due[self.grid.geometry.beside(block, k)])
+            self.read_at[block] = self.claim[block] - now if due > 0 else -1
+
+    @ti.kernel
+    def count_extrapolated(self, now: ti.i32):
+        """Count reads after the end of a particle's step or before its evaluation before the last."""
+        for m in range(self.occupied_count[None]):
+            block = self.occupied[m]
+            if self.read_at[block] >= 0:
+                time = now + self.read_at[block]
+                for k in range(self.grid.first(block), self.grid.first(block + 1)):
+                    i = self.grid.order[k]
+                    begin = self.particles.updated[i]
+                    if ti.static(self.particles.has_past):
+                        begin = ti.min(begin, self.particles.past_updated[i])
+                    if time > self.end(i) or time < begin:
+                        self.extrapolated[None] += 1

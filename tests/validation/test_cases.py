@@ -1,0 +1,74 @@
+"""The validation cases at a coarse size (docs/validation.md has two sizes and all steppers).
+
+Each bound would catch a factor of 1.1 in what the comment beside it names; errors with a wrong factor come from runs with it.
+"""
+
+import numpy as np
+import pytest
+from cases import CASES, run
+from exact import poiseuille
+
+import taichi_rts as rts
+
+STEPPERS = {
+    "uniform": rts.Uniform(),
+    "regional": rts.Regional(),
+    "paper": rts.Regional(preset="paper"),
+    "asynchronous": rts.Asynchronous(steps="integers", stagger=1),
+}
+"""The default regions keep calm water on its longest step; the paper's setting steps regions apart."""
+
+
+@pytest.fixture
+def errors(start_taichi, quick):
+    """Return a function that runs a case and returns its errors."""
+
+    def measure(case, stepper, **wrong):
+        with start_taichi("cpu", "f64", **quick):
+            found, statistics = run(CASES[case], STEPPERS[stepper], **wrong)
+        assert statistics["stopped_by_domain"] == statistics["runaways"] == 0
+        return found
+
+    return measure
+
+
+def test_poiseuille_series():
+    y = np.linspace(0.0, 1.0, 11)
+    np.testing.assert_allclose(poiseuille(y, 1e3, 0.8, 0.1), 4.0 * y * (1.0 - y), atol=1e-9)
+    np.testing.assert_allclose(poiseuille(y[1:-1], 0.0, 0.8, 0.1), 0.0, atol=1e-4)
+    assert poiseuille(0.5, 0.01, 0.8, 0.1) == pytest.approx(0.8 * 0.01, rel=1e-4)  # too early for the walls to be felt
+
+
+@pytest.mark.parametrize("stepper", ["uniform", "regional", "asynchronous"])
+def test_hydrostatic_column(errors, stepper):
+    assert errors("hydrostatic_column", stepper)["pressure"] < 0.03  # measured 0.020; gravity wrong by 1.1: 0.102
+
+
+@pytest.mark.parametrize("stepper", ["uniform", "paper", "asynchronous"])
+def test_taylor_green(errors, stepper):
+    found = errors("taylor_green", stepper)
+    assert found["speed"] < 0.035  # measured 0.025, 0.025, 0.026; viscosity times 1.1: 0.049, over 1.1: 0.097
+    assert found["velocities"] < 0.06  # measured 0.053, 0.053, 0.051; 0.067, 0.109
+
+
+@pytest.mark.parametrize("stepper", ["uniform", "paper", "asynchronous"])
+def test_poiseuille(errors, stepper):
+    found = errors("poiseuille", stepper)
+    assert found["velocity, largest"] < 0.03  # measured 0.013; viscosity wrong by 1.1: 0.076, force: 0.115
+    assert found["velocity, start-up"] < 0.03  # measured 0.010; force: 0.107
+    assert found["velocity, steady"] < 0.03  # measured 0.014; viscosity: 0.075, force: 0.116
+
+
+@pytest.mark.parametrize("stepper", ["uniform", "paper", "asynchronous"])
+def test_standing_wave(errors, stepper):
+    """Ten particles deep; steppers scatter by more than at the docs' size."""
+    found = errors("standing_wave", stepper)
+    assert abs(found["period"]) < 0.028  # measured 0.021, -0.001, -0.003; gravity times 1.1: -0.030, over 1.1: 0.070
+    assert -0.12 < found["crest"] < 0.02  # measured -0.064, -0.082, -0.107; speed times 1.1: 0.029
+
+
+@pytest.mark.parametrize("stepper", ["uniform", "paper"])
+def test_koshizuka_oka(errors, stepper):
+    found = errors("koshizuka_oka", stepper)
+    assert found["front"] < 0.07  # measured 0.051, 0.048
+    assert -0.05 < found["front, signed"] < -0.01  # measured -0.030, -0.032; gravity times 1.1: 0.005, over 1.1: -0.064
