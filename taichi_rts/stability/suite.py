@@ -159,12 +159,13 @@ def stored_cell(plan: Plan, case: Case, setting: Setting, folder: Path) -> Cell:
 
 def run_cell(plan: Plan, case: Case, setting: Setting, demanded: float) -> Cell:
     """Bisect one cell, or only try its default."""
-    scene, build = case.scene, Rerun(plan.fresh)
+    scene, build = case.scene, None if plan.quick else Rerun(plan.fresh)
 
     def run(scene: rts.Scene, stepper: Stepper) -> Outcome:
         return watch(scene, stepper, samples=case.samples, demanded_density=demanded, build=build)
 
     if plan.quick:
+        plan.fresh()
         outcome = run(scene, setting.make(setting.default))
         runs: tuple[tuple[float, Outcome], ...] = ((setting.default, outcome),)
         stable, unstable = (setting.default, None) if outcome.survived else (None, setting.default)
