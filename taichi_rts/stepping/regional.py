@@ -26,15 +26,8 @@ uniform steps. Still pools stay calm up to 0.6 on average, though single ones di
 at 0.8 they simmer (`docs/defaults.md`)."""
 
 PRESETS: dict[str | None, dict[str, Any]] = {
-    None: {"levels": 2, "strict_cfl": False, "lambda_f": 0.1, "local_sound": True},
-    "paper": {
-        "courant": 0.4,
-        "levels": 3,
-        "strict_cfl": False,
-        "lambda_f": 0.1,
-        "local_sound": False,
-        "limiter": False,
-    },
+    None: {"levels": 2, "strict_cfl": False, "lambda_f": 0.1},
+    "paper": {"courant": 0.4, "levels": 3, "strict_cfl": False, "lambda_f": 0.1, "limiter": False},
 }
 """The paper asks for lambda_f <= 0.25. At 0.25 a double dam break gains 2.2 % of energy, at 0.1 0.1 % (docs/defaults.md)."""
 FROM_LEVELS: dict[str, Any] = {
@@ -59,7 +52,8 @@ class Regional:
         alpha, beta, beta_decay: Eq. 3, with beta_n = beta * beta_decay^(n-2).
         lambda_f: Eq. 2, at most 0.25 in the paper; None: 0.1.
         local_sound: shorten steps to what Eq. 1 allows the sound of water that is compressed by more than 3 % (Tait stiffens
-            it: 2.7 c_s at 1.4 rho_0); the base step stays. None: on, off in the paper's preset.
+            it: 2.7 c_s at 1.4 rho_0); the base step stays. It moved no limit in the stability map, and disturbs the first
+            steps of pools whose corners start compressed (docs/stability.md).
         grading: let the levels of neighbouring blocks differ by at most one (R_min alone leaves jumps from 1 to 3).
         limiter: the neighbour limiter: no block's step exceeds twice a neighbour's, and steps grow by one level at a time, when
             synchronised. (Waking needs none: line 12 re-evaluates whoever's block has another step.) None: on from three
@@ -76,7 +70,7 @@ class Regional:
     beta: Positive = 0.4
     beta_decay: Annotated[float, Field(gt=0, le=1)] = 0.2
     lambda_f: Positive | None = None
-    local_sound: bool | None = None
+    local_sound: bool = False
     grading: bool = False
     limiter: bool | None = None
     inactive_density: Literal["stale", "extrapolated"] = "stale"
@@ -130,7 +124,7 @@ class RegionalSchedule(Schedule):
         self.lambda_f = stepper.resolved("lambda_f")
         self.support = scene.support
         self.sound_speed = scene.wave_speed
-        self.local_sound = stepper.resolved("local_sound")
+        self.local_sound = stepper.local_sound
         self.retime(stepper)
         self.fractions = [
             criteria.velocity_fraction(n, stepper.alpha, stepper.beta, stepper.beta_decay)
