@@ -17,8 +17,7 @@ from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
 from taichi_rts.rendering.painter import Mode, PictureOptions
 from taichi_rts.stability.command import Stability
 from taichi_rts.stability.diagnosis import FirstDiagnoses
-
-STEPPERS: dict[str, Any] = {kind.name: kind for kind in (rts.Uniform, rts.Regional, rts.Asynchronous)}
+from taichi_rts.stepping.steppers import STEPPERS
 
 
 @dataclasses.dataclass(frozen=True)

@@ -174,7 +174,7 @@ class Motion:
                 self.particles.rho_rate[i] += diffusion
             power = 0.0  # [W/kg]
             if ti.static(self.particles.has_budget and len(self.moving_walls) > 0):
-                power = self.momentum.wall_power(k)
+                power = self.momentum.wall_power(k)[0]
             if ti.static(self.particles.has_guide):
                 if present < self.particles.guided_until[i]:
                     power = -a_new.dot(self.particles.v[i])

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from taichi_rts.compare import plot, table
 from taichi_rts.errors import OutputError
-from taichi_rts.output.files import write_bytes, write_json
+from taichi_rts.output.files import remove, require_folder, require_writable, write_bytes, write_json
 
 ARTEFACTS = ("compare.json", "compare.csv", "work_precision.png", "runs")
 
@@ -23,24 +21,16 @@ def prepare(folder: Path, *, resume: bool = False, overwrite: bool = False) -> N
     """
     if resume and overwrite:
         raise OutputError("--resume keeps the runs in the folder and --overwrite removes them; give one of the two")
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(f"{folder} is a file, and a folder is needed; choose another --output-dir")
+    require_folder(folder)
     found = [name for name in ARTEFACTS if _holds_something(folder / name)]
     if found and not (resume or overwrite):
         raise OutputError(
             f"{folder} already holds a comparison ({', '.join(found)}); give --resume to go on with it, --overwrite to "
             "replace it, or choose another --output-dir"
         )
-    ancestor = next(path for path in (folder, *folder.absolute().parents) if path.exists())
-    if not os.access(ancestor, os.W_OK | os.X_OK):
-        raise OutputError(f"{folder} cannot be written: no permission in {ancestor}; choose another --output-dir")
+    require_writable(folder)
     if overwrite:
-        for name in found:
-            target = folder / name
-            if target.is_dir():
-                shutil.rmtree(target)
-            else:
-                target.unlink()
+        remove(folder, found)
     try:
         (folder / "runs").mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -53,7 +53,7 @@ class Yardstick:
         medium = Medium.of(scene, calibrate_mass(scene))
         fastest = max(float(np.linalg.norm(v, axis=1).max()) for v in reference.velocities)
         speed = scene.estimate_max_speed() or fastest
-        axes = getattr(scene, "periodic", ())
+        axes = scene.periodic
         periods = [size if "xyz"[d] in axes else np.inf for d, size in enumerate(scene.domain.size)]
         return cls(
             length=float((start.max(axis=0) - start.min(axis=0)).max()) + scene.spacing,

@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 import shutil
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -43,20 +44,35 @@ def prepare_folder(folder: Path, overwrite: bool) -> None:
     Raises `OutputError` if it holds an earlier run and `overwrite` is off, is a file, or cannot be written to. Files that
     no run wrote are never touched.
     """
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(f"{folder} is a file, and a folder is needed; choose another --output-dir")
+    require_folder(folder)
     found = [name for name in ARTEFACTS if (folder / name).exists()]
     if found and not overwrite:
         raise OutputError(
             f"{folder} already holds a run ({', '.join(found)}); choose another --output-dir, or give --overwrite"
         )
+    require_writable(folder)
+    remove(folder, found)
+    folder.mkdir(parents=True, exist_ok=True)
+
+
+def require_folder(folder: Path) -> None:
+    """Raise `OutputError` if there is a file in the folder's place."""
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"{folder} is a file, and a folder is needed; choose another --output-dir")
+
+
+def require_writable(folder: Path) -> None:
+    """Raise `OutputError` if the folder cannot be written to, or made."""
     ancestor = next(path for path in (folder, *folder.absolute().parents) if path.exists())
     if not os.access(ancestor, os.W_OK | os.X_OK):
         raise OutputError(f"{folder} cannot be written: no permission in {ancestor}; choose another --output-dir")
-    for name in found:
+
+
+def remove(folder: Path, names: Iterable[str]) -> None:
+    """Remove files and folders in `folder`, all of which are there."""
+    for name in names:
         target = folder / name
         if target.is_dir():
             shutil.rmtree(target)
         else:
             target.unlink()
-    folder.mkdir(parents=True, exist_ok=True)

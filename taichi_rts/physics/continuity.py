@@ -1,13 +1,12 @@
 """Density integrated in time with the continuity equation, and the diffusion that keeps it smooth (delta-SPH)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import taichi as ti
 
-from taichi_rts.backend import Backend
-from taichi_rts.grid import BlockGrid, make_neighbour_sum
-from taichi_rts.particles import Neighbourhood, Particles
+from taichi_rts.particles import Neighbourhood
+from taichi_rts.physics.density import Density
 from taichi_rts.physics.medium import Medium
 from taichi_rts.physics.momentum import Pressure
 from taichi_rts.scene import Scene
@@ -17,7 +16,7 @@ DELTA = 0.1
 
 
 @ti.data_oriented
-class ContinuityDensity:
+class ContinuityDensity(Density):
     """d rho_i/dt = sum_j m v_ij . grad W_ij + sum_b rho_0 V_b v_ib . grad W_ib + D_i (Monaghan 1994; D_i: `DensityDiffusion`).
 
     The step: rho' = rho + dt [sum_j m v_ij . grad W_ij] + dt D_i with the sum taken at the middle of the step, at the
@@ -30,24 +29,10 @@ class ContinuityDensity:
     integrates = True
     needs = frozenset({"rho_rate", "diffusion", "acceleration"})
 
-    def __init__(
-        self,
-        particles: Particles,
-        near: Neighbourhood,
-        grid: BlockGrid,
-        walls: Sequence[Any],
-        medium: Medium,
-        backend: Backend,
-    ) -> None:
-        self.particles = particles
-        self.near = near
-        self.grid = grid
-        self.walls = list(walls)
-        self.equation_of_state = medium.equation_of_state
-        self.keeps_past = particles.has_past
-        kernel, mass, rest_density = medium.kernel, medium.mass, medium.rest_density
-        geometry = grid.geometry
-        tiny = medium.tiny
+    def pairs(self, medium: Medium) -> tuple[Any, Any]:
+        """Return m v_ij . grad W_ij at the middle of the step, and rho_0 V_b v_ib . grad W_ib for a wall."""
+        near, geometry = self.near, self.grid.geometry
+        kernel, mass, rest_density, tiny = medium.kernel, medium.mass, medium.rest_density, medium.tiny
 
         @ti.func
         def compression(x_ij, v_ij, a_ij, dt):
@@ -69,8 +54,7 @@ class ContinuityDensity:
 
             return pair
 
-        self.sum_fluid = make_neighbour_sum(geometry, grid.start, fluid_pair, 1, backend)
-        self.sum_walls = [make_neighbour_sum(geometry, wall.start, wall_pair(wall), 1, backend) for wall in self.walls]
+        return fluid_pair, wall_pair
 
     @ti.kernel
     def update(self, due: ti.template(), due_count: ti.template(), read_at: ti.template(), now: ti.i32, tick: float):
@@ -78,19 +62,8 @@ class ContinuityDensity:
         for n in range(due_count[None]):
             k = due[n]
             i = self.grid.order[k]
-            x, cell = self.near.x[k], self.grid.cell_of[i]
-            rate = self.sum_fluid(k, x, cell)
-            for w in ti.static(range(len(self.walls))):
-                y, there = self.walls[w].seen_from(k, cell)
-                if self.walls[w].near[self.grid.block_of(there)] == 1:
-                    rate += self.sum_walls[w](k, y, there)
-            before = self.particles.rho[i]
-            rho = before + self.near.elapsed[k] * (rate[0] + self.particles.diffusion[i])
-            if ti.static(self.keeps_past):
-                self.particles.past_rho[i] = before
-            self.near.rho[k] = rho
-            self.near.p_over_rho2[k] = self.equation_of_state.pressure(rho) / (rho * rho)
-            self.particles.rho[i] = rho
+            rate = self.sum_neighbours(k) + self.particles.diffusion[i]
+            self.keep(k, i, self.particles.rho[i] + self.near.elapsed[k] * rate)
 
 
 @ti.data_oriented

@@ -9,6 +9,7 @@ from taichi_rts.backend import Backend
 from taichi_rts.grid import BlockGrid, make_neighbour_sum
 from taichi_rts.particles import Neighbourhood
 from taichi_rts.physics.medium import Medium
+from taichi_rts.physics.walls import make_wall_sum
 from taichi_rts.scene import Scene
 
 
@@ -92,8 +93,6 @@ class MomentumEquation:
     ) -> None:
         self.grid = grid
         self.near = near
-        self.walls = list(walls)
-        self.dtype = backend.dtype
         self.gravity = gravity
         geometry = grid.geometry
         self.dim = dim = geometry.dim
@@ -126,60 +125,37 @@ class MomentumEquation:
             return mass * kernel.gradient_factor(ti.sqrt(d2 + tiny)) * result
 
         @ti.func
-        def wall_acceleration(i, b, x_ib, v_ib, d2, wall: ti.template()):
+        def push(i, b, wall: ti.template()):
+            """Difference of places and velocities, acceleration per unit of factor, and the factor, of a wall particle."""
+            x_ib, v_ib = wall.difference(i, b), wall.relative_velocity(i, b)
+            d2 = x_ib.norm_sqr()
             acceleration = ti.Vector.zero(backend.dtype, dim)
             for term in ti.static(terms):
                 acceleration += term.wall_pair(i, b, x_ib, v_ib, d2, wall)
-            return acceleration
+            return x_ib, v_ib, acceleration, rest_density * wall.volume[b] * kernel.gradient_factor(ti.sqrt(d2 + tiny))
 
         def wall_pair(wall: Any) -> Any:
             @ti.func
             def pair(i, b):
-                x_ib, v_ib = wall.difference(i, b), wall.relative_velocity(i, b)
-                d2 = x_ib.norm_sqr()
-                factor = rest_density * wall.volume[b] * kernel.gradient_factor(ti.sqrt(d2 + tiny))
-                return factor * rates(wall_acceleration(i, b, x_ib, v_ib, d2, wall), v_ib, x_ib)
+                x_ib, v_ib, acceleration, factor = push(i, b, wall)
+                return factor * rates(acceleration, v_ib, x_ib)
 
             return pair
 
         def power_pair(wall: Any) -> Any:
             @ti.func
             def pair(i, b):
-                x_ib, v_ib = wall.difference(i, b), wall.relative_velocity(i, b)
-                d2 = x_ib.norm_sqr()
-                factor = rest_density * wall.volume[b] * kernel.gradient_factor(ti.sqrt(d2 + tiny))
-                return ti.Vector([factor * wall_acceleration(i, b, x_ib, v_ib, d2, wall).dot(near.v[i] - v_ib)])
+                _x_ib, v_ib, acceleration, factor = push(i, b, wall)
+                return ti.Vector([factor * acceleration.dot(near.v[i] - v_ib)])
 
             return pair
 
+        self.moving = [wall for wall in walls if wall.moves]
         self.sum_fluid = make_neighbour_sum(geometry, grid.start, fluid_pair, width, backend)
-        self.sum_walls = [
-            make_neighbour_sum(geometry, wall.start, wall_pair(wall), width, backend) for wall in self.walls
-        ]
-        self.moving = [wall for wall in self.walls if wall.moves]
-        self.sum_power = [
-            make_neighbour_sum(geometry, wall.start, power_pair(wall), 1, backend) for wall in self.moving
-        ]
-
-    @ti.func
-    def wall_rates(self, k):
-        """The walls' share of the rates, (width,), of the particle at place `k`."""
-        total = ti.Vector.zero(self.dtype, self.width)
-        for w in ti.static(range(len(self.walls))):
-            x, cell = self.walls[w].seen_from(k, self.grid.cell_of[self.grid.order[k]])
-            if self.walls[w].near[self.grid.block_of(cell)] == 1:
-                total += self.sum_walls[w](k, x, cell)
-        return total
-
-    @ti.func
-    def wall_power(self, k):
-        """Power [W/kg] of moving walls on the particle at place `k`: their accelerations times their velocities."""
-        total = ti.Vector.zero(self.dtype, 1)
-        for w in ti.static(range(len(self.moving))):
-            x, cell = self.moving[w].seen_from(k, self.grid.cell_of[self.grid.order[k]])
-            if self.moving[w].near[self.grid.block_of(cell)] == 1:
-                total += self.sum_power[w](k, x, cell)
-        return total[0]
+        self.wall_rates = make_wall_sum(walls, grid, wall_pair, width, backend)
+        """The walls' share of the rates, (width,), of the particle at a place."""
+        self.wall_power = make_wall_sum(self.moving, grid, power_pair, 1, backend)
+        """Power [W/kg] of moving walls on the particle at a place, (1,): their accelerations times their velocities."""
 
     @ti.func
     def other_rates(self, k, time):

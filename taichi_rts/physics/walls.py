@@ -8,11 +8,14 @@ Akinci's V_b = 1 / sum_k W_bk makes up for what a single layer lacks, seen from 
 `sampling.calibrate_walls` works it out as seen from fluid at rest on them.
 """
 
+from collections.abc import Callable, Sequence
+from typing import Any
+
 import numpy as np
 import taichi as ti
 
 from taichi_rts.backend import Backend
-from taichi_rts.grid import CELLS_PER_BLOCK, Geometry
+from taichi_rts.grid import CELLS_PER_BLOCK, BlockGrid, Geometry, make_neighbour_sum
 from taichi_rts.particles import Neighbourhood, vector_field
 from taichi_rts.sampling import WallLayer
 
@@ -42,7 +45,7 @@ class Walls:
         self.volume = ti.field(backend.dtype, padded)
         self.normal = vector_field(geometry.dim, backend.dtype, padded)
         self.depth = layer.depth
-        self.volume_factor = layer.stiffness
+        self.stiffness = layer.stiffness
         self.start = ti.field(ti.i32, geometry.cells + 1)
         self.near = ti.field(ti.i32, geometry.blocks)
         pad = backend.lanes
@@ -76,4 +79,27 @@ class Walls:
         may come arbitrarily close.
         """
         distance = self.normal[b].dot(x_ib)
-        return ti.min(distance / ti.max(distance - self.depth, 1e-3 * self.depth), LARGEST_SHEAR) / self.volume_factor
+        return ti.min(distance / ti.max(distance - self.depth, 1e-3 * self.depth), LARGEST_SHEAR) / self.stiffness
+
+
+def make_wall_sum(
+    walls: Sequence[Any], grid: BlockGrid, make_pair: Callable[[Any], Any], width: int, backend: Backend
+) -> Callable[..., Any]:
+    """Return a ti.func `total(k)`: the sum over all particles of all `walls` near the fluid at place `k`.
+
+    `make_pair(wall)` returns the ti.func `pair(k, b)`, a vector of `width`, as `make_neighbour_sum` takes it.
+    """
+    walls = list(walls)
+    sums = [make_neighbour_sum(grid.geometry, wall.start, make_pair(wall), width, backend) for wall in walls]
+
+    @ti.func
+    def sum_walls(k):
+        total = ti.Vector.zero(backend.dtype, width)
+        here = grid.cell_of[grid.order[k]]
+        for w in ti.static(range(len(walls))):
+            x, cell = walls[w].seen_from(k, here)
+            if walls[w].near[grid.block_of(cell)] == 1:
+                total += sums[w](k, x, cell)
+        return total
+
+    return sum_walls

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -13,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from taichi_rts.errors import OutputError
-from taichi_rts.output.files import write_bytes, write_json
+from taichi_rts.output.files import remove, require_folder, write_bytes, write_json
 from taichi_rts.report import console
 from taichi_rts.stability import chart
 from taichi_rts.stability.cases import CASES
@@ -127,16 +126,11 @@ def prepare_folder(folder: Path, resume: bool, overwrite: bool) -> None:
     """
     if resume and overwrite:
         raise OutputError("--resume keeps what --overwrite removes; give one of them")
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(f"{folder} is a file, and a folder is needed; choose another --output-dir")
+    require_folder(folder)
     found = [name for name in ARTEFACTS if (folder / name).exists()]
     if found and not (resume or overwrite):
         raise OutputError(
             f"{folder} already holds a map ({', '.join(found)}); give --resume or --overwrite, or choose another --output-dir"
         )
-    for name in found if overwrite else []:
-        target = folder / name
-        if target.is_dir():
-            shutil.rmtree(target)
-        else:
-            target.unlink()
+    if overwrite:
+        remove(folder, found)

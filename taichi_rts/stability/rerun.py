@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from taichi_rts.compare.rewind import Rewind
+from taichi_rts.rewind import Rewind
 from taichi_rts.scene import Scene
 from taichi_rts.simulation import Simulation
 from taichi_rts.stepping.base import Stepper

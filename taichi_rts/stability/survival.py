@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_rts.conditions import face_axis
 from taichi_rts.errors import Error, SimulationDivergedError
 from taichi_rts.scene import Scene
 from taichi_rts.simulation import Simulation
@@ -251,9 +252,9 @@ def lost_particles(sim: Simulation, x: np.ndarray, expected: int) -> str:
         return f"{expected - sim.count} of {expected} particles gone"
     lower, upper = (np.array(corner, dtype=np.float64) for corner in (sim.scene.domain.lower, sim.scene.domain.upper))
     for wall in sim.scene.moving_walls:
-        axis, face = "xyz".index(wall.face[0]), lower if wall.face[1] == "-" else upper
-        face[axis] += np.interp(sim.time, wall.times, wall.displacements)
+        axis, face = face_axis(wall.face), lower if wall.face[1] == "-" else upper
+        face[axis] += wall.displacement(sim.time)
     slack = 1e-3 * sim.scene.spacing + 4.0 * np.spacing(np.abs(x).max())  # the rounding of the state's precision
-    closed = np.array(["xyz"[d] not in sim.scene.periodic for d in range(sim.scene.dim)])
+    closed = ~np.array(sim.scene.is_periodic)
     outside = (((x < lower - slack) | (x > upper + slack)) & closed).any(axis=1)
     return f"{int(outside.sum())} particles outside the walls" if outside.any() else ""

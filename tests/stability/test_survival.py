@@ -142,8 +142,9 @@ def test_samples_lie_at_ends_of_base_steps_and_at_the_end():
 
 
 def test_a_particle_behind_a_moving_wall_is_lost():
-    wall = SimpleNamespace(face="x-", times=(0.0, 1.0), displacements=(0.0, 0.3))
-    scene = SimpleNamespace(domain=rts.Box((0, 0), (1, 1)), moving_walls=(wall,), periodic=("y",), spacing=0.1, dim=2)
+    wall = rts.MovingWall("x-", times=(0.0, 1.0), displacements=(0.0, 0.3))
+    block = rts.Block((0.4, 0), (1, 1))
+    scene = rts.Scene(rts.Box((0, 0), (1, 1)), (block,), 0.1, moving_walls=(wall,), periodic=("y",), sound_speed=10.0)
     x = np.array([[0.1, 0.5], [0.2, 0.5], [0.5, 1.5]])
     sim = SimpleNamespace(scene=scene, count=3, time=0.5)
     assert survival.lost_particles(sim, x, 3) == "1 particles outside the walls"

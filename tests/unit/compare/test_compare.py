@@ -10,8 +10,8 @@ from taichi_rts import cli
 from taichi_rts.compare import compare, executors, jobs, references
 from taichi_rts.compare.executors import Here, Task, collect
 from taichi_rts.compare.jobs import Job, stepper_data
-from taichi_rts.compare.rewind import Rewind
 from taichi_rts.compare.runner import Settings
+from taichi_rts.rewind import Rewind
 
 SIZE = ["--particles", "100", "--end-time", "0.02", "--samples", "4", "--repeats", "2"]
 
