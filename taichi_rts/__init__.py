@@ -17,6 +17,7 @@ from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
 from taichi_rts.scene import Scene, View, load_scene, scene_names
 from taichi_rts.shapes import Block, Box, Sphere
 from taichi_rts.simulation import Simulation
+from taichi_rts.sound import RegionalSound
 from taichi_rts.stepping.asynchronous import Asynchronous
 from taichi_rts.stepping.regional import Regional
 from taichi_rts.stepping.uniform import Uniform
@@ -35,6 +36,7 @@ __all__ = [
     "MovingWall",
     "OutputError",
     "Regional",
+    "RegionalSound",
     "RenderError",
     "Scene",
     "SceneError",

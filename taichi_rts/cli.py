@@ -13,6 +13,7 @@ import taichi_rts as rts
 from taichi_rts import backend, report
 from taichi_rts.compare.command import Compare
 from taichi_rts.errors import Error, OutputError, SimulationDivergedError
+from taichi_rts.extremes import Extremes
 from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
 from taichi_rts.rendering.painter import Mode, PictureOptions
 from taichi_rts.stability.command import Stability
@@ -55,7 +56,7 @@ class Run:
     inactive_density: Literal["stale", "extrapolated"] | None = None
     """Regional, asynchronous: density of particles that are not due."""
     steps: Literal["powers_of_two", "integers"] | None = None
-    """Asynchronous: lengths that steps may have, in base steps; powers_of_two keeps blocks in step with each other."""
+    """Regional, asynchronous: lengths that steps may have, in base steps; powers_of_two keeps blocks in step with each other."""
     limiter: bool | None = None
     """Regional, asynchronous: bound a block's step by its neighbours' and by its last, and wake neighbours."""
     stagger: int | None = None
@@ -68,8 +69,8 @@ class Run:
     """Initial particle spacing [m]."""
     particles: str | None = None
     """Number of fluid particles instead of a spacing, e.g. 30k or 1.5M."""
-    sound_speed: float | None = None
-    """Sound speed [m/s]; by default ten times the largest speed the scene suggests."""
+    sound_speed: float | Literal["regional"] | None = None
+    """Sound speed [m/s], or regional; by default ten times the largest speed the scene suggests."""
     end_time: float | None = None
     """Physical time to run to [s]; by default the scene's own."""
     export_fps: float = 60.0
@@ -126,9 +127,14 @@ class Run:
         check_size(self.width, self.height)
         device = rts.init(self.arch, self.precision)
         recorder = Recorder(scene, panels, options, recording, debug=self.debug)
-        diagnoses = FirstDiagnoses(recorder.runs)
+        diagnoses, extremes = FirstDiagnoses(recorder.runs), Extremes(recorder.runs)
+
+        def look() -> None:
+            diagnoses.look()
+            extremes.look()
+
         try:
-            with report.progress(recorder.runs, scene.end_time, device, diagnoses.look) as on_frame:
+            with report.progress(recorder.runs, scene.end_time, device, look) as on_frame:
                 recorder.record(scene.end_time, on_frame)
         except SimulationDivergedError:
             diagnoses.look()
@@ -136,7 +142,9 @@ class Run:
                 report.print_diagnosis(diagnosis)
             raise
         for stepper, sim in recorder.runs.items():
-            report.print_table(sim, recorder.initial_energy[stepper], diagnoses.found.get(stepper))
+            report.print_table(
+                sim, recorder.initial_energy[stepper], diagnoses.found.get(stepper), extremes.facts(stepper)
+            )
         report.print_folder(folder, frames)
 
     def make_stepper(self) -> Any:

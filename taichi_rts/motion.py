@@ -130,7 +130,7 @@ class Motion:
                     self.near.v[k] = self.velocity(i, dt, tick)
                     rho = self.density(i, dt, tick)
                     self.near.rho[k] = rho
-                    self.near.p_over_rho2[k] = self.equation_of_state.pressure(rho) / (rho * rho)
+                    self.near.p_over_rho2[k] = self.equation_of_state.pressure_of(i, rho) / (rho * rho)
                     if ti.static(self.near.has_acceleration):
                         self.near.a[k] = self.particles.a[i]
                         self.near.elapsed[k] = dt

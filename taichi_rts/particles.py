@@ -33,6 +33,8 @@ class Particles:
         past: the state at the evaluation before the last (`past_x`, `past_v`, `past_rho`, `past_updated`), where a stepper lets
             some particles run ahead of others, so that readers may look back.
         viscosity: nu [m^2/s], where fluids differ in it.
+        sound: c_i [m/s] and `reference`, the density rho_ref [kg/m^3] at which its pressure is zero, where the sound speed is
+            regional.
         guided_until: the tick until which an inflow prescribes the velocity.
         budget: in debug runs, `wall_push`, the velocity [m/s] that walls have given a particle so far, and `a_walls`, their
             share of its acceleration; `work` [J/kg] that moving walls and inflows have done on it, and its `power` [W/kg].
@@ -56,6 +58,7 @@ class Particles:
         self.has_diffusion = "diffusion" in needs
         self.has_past = "past" in needs
         self.has_viscosity = "viscosity" in needs
+        self.has_sound = "sound" in needs
         self.has_guide = "guided_until" in needs
         self.has_budget = "budget" in needs
         self.reals: list[ti.Field] = []
@@ -84,6 +87,9 @@ class Particles:
             self.past_x, self.past_v, self.past_rho, self.past_updated = vector(), vector(), scalar(), integer()
         if self.has_viscosity:
             self.viscosity = scalar()
+        if self.has_sound:
+            self.sound, self.reference = scalar(), scalar()
+            self.reference.fill(rest_density)
         if self.has_guide:
             self.guided_until = integer()
         if self.has_budget:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
@@ -59,8 +59,13 @@ def rate(updates: float, seconds: float) -> str:
     return f"{updates / seconds / 1e6:.2f} M updates/s" if seconds > 0.0 else "- updates/s"
 
 
-def print_table(sim: Simulation, initial_energy: Energy, diagnosis: Diagnosis | None = None) -> None:
-    """Print shares per level, active fraction, updates/s, the bound of the speed-up, the energy drift, and a diagnosis."""
+def print_table(
+    sim: Simulation,
+    initial_energy: Energy,
+    diagnosis: Diagnosis | None = None,
+    more: Sequence[tuple[str, str]] = (),
+) -> None:
+    """Print shares per level, active fraction, updates/s, bound of the speed-up, energy drift, `more` facts, and a diagnosis."""
     statistics = sim.statistics
     levels = Table(title=f"{sim.scene.name}, {sim.stepper.name} steps", title_justify="left")
     for heading in ("level", "step [ms]", "share of particles", "share of updates"):
@@ -98,6 +103,11 @@ def print_table(sim: Simulation, initial_energy: Energy, diagnosis: Diagnosis | 
         facts.add_row("work put in", f"{work:+.4g} J, not in the drift")
     if not sim.keeps_work:
         facts.add_row("", "with the work of walls and inflows; --debug tells them apart")
+    for name, fact in more:
+        facts.add_row(name, fact)
+    if sim.sound is not None:
+        c = sim.sound_speeds()
+        facts.add_row("sound speed", f"{c.min():.3g} to {c.max():.3g} m/s at the end, mean {c.mean():.3g}")
     facts.add_row("stopped by the box", f"{statistics['stopped_by_domain']} centres")
     if statistics["runaways"]:
         facts.add_row("[bold red]blown up[/]", f"limited {statistics['runaways']:,} times; use a smaller --courant")

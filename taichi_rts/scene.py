@@ -21,6 +21,7 @@ from taichi_rts.errors import SceneError
 from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
 from taichi_rts.scene_checks import contradictions
 from taichi_rts.shapes import Block, Box, Fluid, Sphere, top_speed
+from taichi_rts.sound import FLOOR, RegionalSound
 from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, describe, validated
 
 if sys.version_info >= (3, 11):
@@ -28,6 +29,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+LARGEST_RATIO = 32.0  # of sound speeds in one scene
 BUILT_IN = Path(__file__).parent / "scenes"
 
 
@@ -55,7 +57,8 @@ class Scene:
         gravity: acceleration [m/s^2], (dim,); None: 9.81 m/s^2 along -y.
         gravity_changes: from each one's time on gravity is another.
         body_force: acceleration [m/s^2] added to gravity, linear in space; its gradient must be symmetric.
-        sound_speed: c_s [m/s]; None: ten times an estimate of the largest speed (see `estimate_max_speed`).
+        sound_speed: c_s [m/s]; None: ten times an estimate of the largest speed (see `estimate_max_speed`); "regional" or a
+            `RegionalSound`: every block's own.
         density: "summation" (over the neighbours) or "continuity" (integrated in time, with delta-SPH diffusion).
         background_pressure: [Pa] added to the equation of state; keeps fluid without a free surface from tearing.
         kernel: "cubic_spline" or "wendland_c2".
@@ -80,7 +83,7 @@ class Scene:
     gravity: Vector | None = None
     gravity_changes: tuple[GravityChange, ...] = ()
     body_force: LinearField | None = None
-    sound_speed: Positive | None = None
+    sound_speed: Positive | Literal["regional"] | RegionalSound | None = None
     density: Literal["summation", "continuity"] = "summation"
     background_pressure: NotNegative = 0.0
     kernel: Literal["cubic_spline", "wendland_c2"] = "cubic_spline"
@@ -137,9 +140,66 @@ class Scene:
         return (*(self.kinematic_viscosity if nu is None else nu for nu in own), *inflow)
 
     @property
+    def regional_sound(self) -> RegionalSound | None:
+        """What governs the regional sound speed, if there is one."""
+        return (
+            RegionalSound()
+            if self.sound_speed == "regional"
+            else self.sound_speed
+            if isinstance(self.sound_speed, RegionalSound)
+            else None
+        )
+
+    @property
     def wave_speed(self) -> float:
-        """Sound speed c_s [m/s]: as given, or ten times `estimate_max_speed` (Becker & Teschner 2007, for 1 % compression)."""
+        """Sound speed c_s [m/s]: as given, or ten times `estimate_max_speed` (Becker & Teschner 2007, for 1 % compression).
+
+        The largest, where it is regional: it sets the base step.
+        """
+        regional = self.regional_sound
+        if regional is not None:
+            return regional.cap if regional.cap is not None else 2.0 / regional.mach * self.estimate_max_speed()
+        assert not isinstance(self.sound_speed, (str, RegionalSound))  # for mypy
         return self.sound_speed if self.sound_speed is not None else 10.0 * self.estimate_max_speed()
+
+    @property
+    def viscous_wave_speed(self) -> float:
+        """Sound speed [m/s] in the artificial viscosity alpha h c: that of the scene with one sound speed.
+
+        It must not follow the region, or calm water would get less viscosity and the flow would be another.
+        """
+        return self.wave_speed if self.regional_sound is None else 10.0 * self.estimate_max_speed()
+
+    @property
+    def least_wave_speed(self) -> float:
+        """Smallest sound speed [m/s] that any region may have; `wave_speed` where it is the same everywhere."""
+        regional = self.regional_sound
+        if regional is None:
+            return self.wave_speed
+        floor = regional.floor if regional.floor is not None else FLOOR * math.sqrt(self.depth_potential)
+        return min(max(floor, self.wave_speed / LARGEST_RATIO), self.wave_speed)
+
+    @property
+    def depth_potential(self) -> float:
+        """Product g H [m^2/s^2], H being the largest depth of the fluids, one on top of the other, under any gravity of the run."""
+        return max(self._stack(gravity) for gravity in (self.acceleration, *(c.gravity for c in self.gravity_changes)))
+
+    def _stack(self, gravity: tuple[float, ...]) -> float:
+        """Product g H [m^2/s^2] under `gravity` [m/s^2], (dim,): fluids that overlap across its main axis stand on each other."""
+        main = max(range(self.dim), key=lambda d: abs(gravity[d]))
+        across = [d for d in range(self.dim) if d != main]
+        thickness = [
+            sum(abs(g) * (b - a) for g, a, b in zip(gravity, fluid.lower, fluid.upper, strict=True))
+            for fluid in self.fluids
+        ]
+        return max(
+            sum(
+                thickness[k]
+                for k, other in enumerate(self.fluids)
+                if all(other.lower[d] < fluid.upper[d] and fluid.lower[d] < other.upper[d] for d in across)
+            )
+            for fluid in self.fluids
+        )
 
     def estimate_max_speed(self) -> float:
         """Largest speed [m/s] any fluid can reach by falling from where it is: max of sqrt(|v|^2 + 2 g H).
@@ -175,7 +235,20 @@ class Scene:
         return pydantic.TypeAdapter(Scene).dump_python(self, mode="json", exclude_none=True)
 
 
-_PARTS = (Scene, Box, Block, Sphere, LinearField, TaylorGreen, StandingWave, GravityChange, MovingWall, Inflow, View)
+_PARTS = (
+    Scene,
+    Box,
+    Block,
+    Sphere,
+    LinearField,
+    TaylorGreen,
+    StandingWave,
+    GravityChange,
+    MovingWall,
+    Inflow,
+    View,
+    RegionalSound,
+)
 _KEYS = [key for cls in _PARTS for key in cls.__dataclass_fields__]  # type: ignore[attr-defined]
 
 

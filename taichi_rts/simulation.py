@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time as clock
 from typing import Any, cast
 
@@ -17,9 +18,11 @@ from taichi_rts.motion import Motion
 from taichi_rts.particles import Neighbourhood, Particles
 from taichi_rts.physics.continuity import ContinuityDensity, DensityDiffusion, MirroredPressure
 from taichi_rts.physics.density import SummationDensity
+from taichi_rts.physics.floating_reference import FloatingReference
 from taichi_rts.physics.medium import Medium
 from taichi_rts.physics.momentum import Gravity, MomentumEquation, Pressure
 from taichi_rts.physics.moving_walls import MovingFace
+from taichi_rts.physics.sound_rule import SoundRule
 from taichi_rts.physics.viscosity import viscosity_terms
 from taichi_rts.physics.walls import Walls
 from taichi_rts.sampling import Sample, sample
@@ -68,6 +71,7 @@ class Simulation:
             "past": self.stepper.keeps_past,
             "viscosity": len(set(scene.viscosities)) > 1,
             "guided_until": bool(scene.inflows),
+            "sound": scene.regional_sound is not None,
             "budget": debug,
         }
         needs = density.needs | {name for name, needed in wanted.items() if needed}
@@ -82,6 +86,10 @@ class Simulation:
         drift = self.stepper.drift * scene.support
         geometry = Geometry(scene.domain.lower, scene.domain.upper, scene.support, drift, scene.is_periodic)
         self.grid = BlockGrid(geometry, capacity, self.particles.alive)
+        self.sound = SoundRule(scene, self.particles, self.grid) if self.particles.has_sound else None
+        if self.sound:
+            law = FloatingReference(self.medium.equation_of_state, self.particles, self.sound)
+            self.medium = dataclasses.replace(self.medium, equation_of_state=law)
         self.near = Neighbourhood(capacity, scene.dim, backend, needs)
         self.walls = make_walls(scene, start, self.near, geometry, backend)
         self.density = density(self.particles, self.near, self.grid, self.walls, self.medium, backend)
@@ -109,6 +117,7 @@ class Simulation:
         )
         self.schedule = self.stepper.schedule(scene, self.particles, self.grid, self.timeline)
         self.schedule.debug = debug
+        self.schedule.sound = self.sound
 
         self.overhead = Overhead(self.particles)
         self._tally = Tally(self.schedule.levels)
@@ -133,6 +142,8 @@ class Simulation:
         with self.overhead.shared:
             if schedule.needs_sorting:
                 self._sort(now, tick)  # line 4
+            if self.sound and schedule.needs_sound:
+                self.sound.update(now, tick)
             schedule.select(now, tick)  # lines 5-16
             self.motion.predict_neighbourhood(schedule.read_at, now, tick)  # lines 25-26, where somebody looks
         with self.overhead.due:
@@ -237,6 +248,12 @@ class Simulation:
     def pressures(self) -> np.ndarray:
         """Pressures [Pa], (N,), by particle id, that belong to `densities`."""
         return self.medium.equation_of_state.pressure_numpy(self.densities())
+
+    def sound_speeds(self) -> np.ndarray:
+        """Sound speeds [m/s], (N,), at each particle's last evaluation, by particle id."""
+        if self.sound is None:
+            return np.full(self.count, self.medium.sound_speed)
+        return self.particles.to_numpy(self.particles.sound)
 
     def levels(self) -> np.ndarray:
         """Levels n, (N,): each particle's step is n base steps. In order of particle id."""

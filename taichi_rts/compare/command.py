@@ -48,7 +48,7 @@ class Compare:
 
     scene: tyro.conf.Positional[str] = "dam_break_2d"
     """Name of a built-in scene (see `taichi-rts scenes`) or path of a TOML file."""
-    steppers: str = ",".join(sweeps.KINDS)
+    steppers: str = ",".join(sweeps.ONE_SOUND_SPEED)
     """Which to compare, with commas between; paper is regional with the paper's preset."""
     courants: str = ",".join(f"{courant:g}" for courant in COURANTS)
     """Courant numbers dt c_s / r of the longest step (paper: of its base step), with commas between."""

@@ -135,7 +135,7 @@ class _Follower:
         x, v, rho, _ = sim.state()
         if len(self.record.times) % self.every == 0:
             self.neighbours.append(mean_neighbours(x, sim.scene.support))
-        self.record.append(sim.time, x, v, rho, sim.energy())
+        self.record.append(sim.time, x, v, rho, sim.pressures(), sim.energy())
 
 
 def _work(sim: Any, statistics: dict[str, Any], neighbours: float) -> dict[str, Any]:

@@ -184,7 +184,7 @@ def momentum(run: Trajectory, reference: Trajectory, scale: Yardstick, together:
 def probe_pressures(run: Trajectory, k: int, scale: Yardstick) -> np.ndarray:
     """Pressures [Pa] at the probes, (P,), at sample k: sum_j p_j W_j / sum_j W_j over the support radius, 0 where it is empty."""
     x = run.positions[k].astype(np.float64)
-    p = scale.medium.equation_of_state.pressure_numpy(run.densities[k].astype(np.float64))
+    p = run.pressures[k].astype(np.float64)
     found = np.zeros(len(scale.probes))
     for i, probe in enumerate(scale.probes):
         weights = scale.medium.kernel.sample(

@@ -40,7 +40,7 @@ class Settings:
         cache: folder of the references; None: `references.default_cache`.
     """
 
-    steppers: tuple[str, ...] = tuple(sweeps.KINDS)
+    steppers: tuple[str, ...] = sweeps.ONE_SOUND_SPEED
     courants: tuple[float, ...] = COURANTS
     sets: tuple[str, ...] = ()
     samples: int = 40
@@ -138,9 +138,15 @@ class _Comparison:
     def job(self, variant: Variant) -> Job:
         """Return the run of a variant as plain data."""
         s = self.settings
-        scene = self.scenes[variant.scene][0].to_dict()
+        scene = self.scenes[variant.scene][0].replace(**sweeps.changes_by(variant.family))
         return Job(
-            scene, variant.stepper, s.samples, s.arch, s.precision, s.repeats, density=self.densities[variant.scene]
+            scene.to_dict(),
+            variant.stepper,
+            s.samples,
+            s.arch,
+            s.precision,
+            s.repeats,
+            density=self.densities[variant.scene],
         )
 
     def reference(self, number: int) -> tuple[Job, Job]:

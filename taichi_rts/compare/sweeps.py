@@ -18,8 +18,13 @@ KINDS: dict[str, Any] = {
     "regional": rts.Regional,
     "paper": rts.Regional,
     "asynchronous": rts.Asynchronous,
+    "uniform-c": rts.Uniform,
+    "regional-c": rts.Regional,
+    "asynchronous-c": rts.Asynchronous,
 }
-"""Steppers that can be compared, by the name on the command line; `paper` is `Regional(preset="paper")`."""
+"""Steppers that can be compared, by the name on the command line; `paper` is `Regional(preset="paper")`, and those that end in
+"-c" run with the regional sound speed, `uniform-c` with one adaptive step for all."""
+ONE_SOUND_SPEED = ("uniform", "regional", "paper", "asynchronous")
 FIXED = {"courant": "--courants", "preset": "--steppers paper", "end_time": "--end-time"}
 """Parameters that are no sweep, and the option to use instead."""
 SHAPE = ("domain", "fluids", "view", "name", "description")
@@ -131,9 +136,12 @@ def make_stepper(name: str, courant: float, options: dict[str, Any]) -> Any:
 
     The number is the Courant number of the longest step, lambda = dt_max c_s / r, because that is what stability limits: of the
     one step of `Uniform`, of level n_max of `Regional` (so its base step has courant / n_max, unless `strict_cfl`, which
-    divides by itself), and of the longest step of `Asynchronous`. Only `paper` is by its base step, as the paper means it.
+    divides by itself), and of the longest step of `Asynchronous`. Only `paper` is by its base step, as the paper means it. With
+    the regional sound speed it is that of every step with its own sound speed.
     """
     kind = KINDS[name]
+    if name == "uniform-c":
+        return kind(courant=courant, adaptive=True, **options)
     if name == "paper":
         return kind(preset="paper", courant=courant, **options)
     if name == "regional":
@@ -141,6 +149,11 @@ def make_stepper(name: str, courant: float, options: dict[str, Any]) -> Any:
         if not resolved.resolved("strict_cfl"):
             return kind(courant=courant / resolved.resolved("levels"), **options)
     return kind(courant=courant, **options)
+
+
+def changes_by(name: str) -> dict[str, Any]:
+    """What the stepper `name` changes in the scene."""
+    return {"sound_speed": "regional"} if name.endswith("-c") else {}
 
 
 def scenes_of(scene: Scene, changes: list[dict[str, Any]]) -> list[Scene]:

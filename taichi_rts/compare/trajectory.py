@@ -17,6 +17,7 @@ class Trajectory:
         times: [s], (S,).
         positions, velocities: for each time (N, dim) [m], [m/s].
         densities: for each time (N,) [kg/m^3].
+        pressures: for each time (N,) [Pa].
         energies: for each time kinetic, potential and internal energy [J].
     """
 
@@ -24,14 +25,16 @@ class Trajectory:
     positions: list[np.ndarray] = field(default_factory=list)
     velocities: list[np.ndarray] = field(default_factory=list)
     densities: list[np.ndarray] = field(default_factory=list)
+    pressures: list[np.ndarray] = field(default_factory=list)
     energies: list[tuple[float, ...]] = field(default_factory=list)
 
-    def append(self, time: float, x: np.ndarray, v: np.ndarray, rho: np.ndarray, energy: Any) -> None:
+    def append(self, time: float, x: np.ndarray, v: np.ndarray, rho: np.ndarray, p: np.ndarray, energy: Any) -> None:
         """Add the state at `time` [s]."""
         self.times.append(float(time))
         self.positions.append(x)
         self.velocities.append(v)
         self.densities.append(rho)
+        self.pressures.append(p.astype(rho.dtype))
         self.energies.append(tuple(float(part) for part in energy))
 
     def to_bytes(self) -> bytes:
@@ -44,6 +47,7 @@ class Trajectory:
             positions=np.concatenate(self.positions),
             velocities=np.concatenate(self.velocities),
             densities=np.concatenate(self.densities),
+            pressures=np.concatenate(self.pressures),
             energies=np.asarray(self.energies),
         )
         return buffer.getvalue()
@@ -53,6 +57,7 @@ class Trajectory:
         """Read what `to_bytes` wrote; raises `ValueError`, `KeyError`, `OSError` or `BadZipFile` if it did not."""
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
             ends = np.cumsum(file["counts"])[:-1]
-            x, v, rho = (list(np.split(file[name], ends)) for name in ("positions", "velocities", "densities"))
+            names = ("positions", "velocities", "densities", "pressures")
+            x, v, rho, p = (list(np.split(file[name], ends)) for name in names)
             energies = [tuple(float(part) for part in row) for row in file["energies"]]
-            return cls([float(time) for time in file["times"]], x, v, rho, energies)
+            return cls([float(time) for time in file["times"]], x, v, rho, p, energies)

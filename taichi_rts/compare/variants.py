@@ -20,14 +20,14 @@ class Variant:
 
     Attributes:
         scene: number of the scene among those compared.
-        family: uniform, regional, paper or asynchronous.
+        family: one of `sweeps.KINDS`.
         courant: the sweep's number (`sweeps.make_stepper`).
         options: the stepper's parameters that were set.
         changes: the scene's parameters that were set.
         stepper: the stepper as plain data.
         role: why it runs: as part of the sweep, or as a baseline (`BASE_STEP`, `LARGEST_STABLE`).
         equal_step: Courant number of the uniform run that is its baseline at equal step: that of the base step dt_b, for
-            asynchronous steps that of the longest.
+            asynchronous steps that of the longest, and with the regional sound speed the same number.
     """
 
     scene: int
@@ -64,7 +64,7 @@ def make_variants(
             for options in sweeps.for_stepper(sets, family):
                 for courant in courants:
                     stepper = sweeps.make_stepper(family, courant, options)
-                    equal = equal_step(stepper, scene)
+                    equal = courant if sweeps.changes_by(family) else equal_step(stepper, scene)
                     here.append(Variant(number, family, courant, options, changes, stepper_data(stepper), equal))
         bases = [uniform_variant(v.scene, v.equal_step, changes, BASE_STEP) for v in here if v.family != "uniform"]
         known = {(v.courant) for v in here if v.family == "uniform" and not v.options}

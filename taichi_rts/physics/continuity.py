@@ -63,7 +63,8 @@ class ContinuityDensity(Density):
             k = due[n]
             i = self.grid.order[k]
             rate = self.sum_neighbours(k) + self.particles.diffusion[i]
-            self.keep(k, i, self.particles.rho[i] + self.near.elapsed[k] * rate)
+            rho = self.particles.rho[i] + self.near.elapsed[k] * rate
+            self.keep(k, i, rho, now + read_at[self.grid.block(i)], tick)
 
 
 @ti.data_oriented

@@ -51,12 +51,14 @@ class Density:
         return total[0]
 
     @ti.func
-    def keep(self, k, i, rho):
-        """Give particle `i` at place `k` its density [kg/m^3], and with it p/rho^2."""
+    def keep(self, k, i, rho, present, tick):
+        """Give particle `i` at place `k` its density [kg/m^3] of tick `present`, and with it p/rho^2."""
+        elapsed = ti.cast(present - self.particles.updated[i], float) * tick
+        self.equation_of_state.adapt(i, self.grid.block(i), rho, elapsed)
         if ti.static(self.keeps_past):
             self.particles.past_rho[i] = self.particles.rho[i]
         self.near.rho[k] = rho
-        self.near.p_over_rho2[k] = self.equation_of_state.pressure(rho) / (rho * rho)
+        self.near.p_over_rho2[k] = self.equation_of_state.pressure_of(i, rho) / (rho * rho)
         self.particles.rho[i] = rho
 
 
@@ -94,4 +96,5 @@ class SummationDensity(Density):
         """Find density [kg/m^3] and p/rho^2 of the due particles, which stand at places `due[0 .. due_count]`."""
         for n in range(due_count[None]):
             k = due[n]
-            self.keep(k, self.grid.order[k], self.sum_neighbours(k))
+            i = self.grid.order[k]
+            self.keep(k, i, self.sum_neighbours(k), now + read_at[self.grid.block(i)], tick)

@@ -6,6 +6,13 @@ import numpy as np
 import taichi as ti
 
 
+@ti.func
+def tait(stiffness, ratio):
+    """B ((rho/rho_ref)^7 - 1) [Pa] for the stiffness B [Pa] and the ratio of densities."""
+    square = ratio * ratio
+    return stiffness * (square * square * square * ratio - 1.0)
+
+
 @ti.data_oriented
 class Tait:
     """p = p_b + B ((rho/rho_0)^7 - 1) with B = rho_0 c_s^2 / 7; p >= 0, because a free surface cannot pull.
@@ -24,12 +31,19 @@ class Tait:
     @ti.func
     def pressure(self, rho):
         """Pressure [Pa] at density `rho` [kg/m^3]."""
-        ratio = rho * (1.0 / self.rest_density)
-        square = ratio * ratio
-        pressure = self.stiffness * (square * square * square * ratio - 1.0)
+        pressure = tait(self.stiffness, rho * (1.0 / self.rest_density))
         if ti.static(self.background > 0.0):
             pressure += self.background
         return ti.max(pressure, 0.0)
+
+    @ti.func
+    def pressure_of(self, i, rho):
+        """Pressure [Pa] of particle `i` at density `rho` [kg/m^3]."""
+        return self.pressure(rho)
+
+    @ti.func
+    def adapt(self, i, block, rho, elapsed):
+        """Take note that particle `i` in `block` now has density `rho` [kg/m^3], `elapsed` [s] after its last evaluation."""
 
     def pressure_numpy(self, rho: Any) -> Any:
         """Pressure [Pa] for a NumPy array of densities [kg/m^3]."""

@@ -14,8 +14,8 @@ from taichi_rts.smoothing import make_kernel
 class Medium:
     """The fluid as the solver sees it.
 
-    `mass` m of a particle [kg], `rest_density` rho_0 [kg/m^3], `support` radius r [m], `sound_speed` c_s [m/s], the
-    smoothing `kernel` and the `equation_of_state`.
+    `mass` m of a particle [kg], `rest_density` rho_0 [kg/m^3], `support` radius r [m], `sound_speed` c_s [m/s] (where it is
+    regional, the largest), the smoothing `kernel` and the `equation_of_state`.
     """
 
     mass: float

@@ -78,7 +78,7 @@ def viscosity_terms(scene: Scene, medium: Medium, near: Neighbourhood) -> list[A
     h = 0.5 * medium.support
     terms: list[Any] = []
     if scene.artificial_viscosity > 0.0:
-        terms.append(ArtificialViscosity(near, scene.artificial_viscosity, h, medium.sound_speed))
+        terms.append(ArtificialViscosity(near, scene.artificial_viscosity, h, scene.viscous_wave_speed))
     if max(scene.viscosities) > 0.0:
         same = len(set(scene.viscosities)) == 1
         terms.append(LaminarViscosity(near, scene.viscosities[0] if same else None, h))

@@ -95,6 +95,11 @@ def _by_lead(leads, longest_step, **_):
     return scalar_colours(leads, *step_range(leads, longest_step))
 
 
+def _by_sound(sounds, top_sound, **_):
+    sounds = _needed("sound", "sounds", sounds)
+    return scalar_colours(sounds, *sound_range(sounds, top_sound))
+
+
 def _plain(count, **_):
     return np.tile(np.asarray(PLAIN, np.float32), (count, 1))
 
@@ -105,6 +110,7 @@ _MODES = {
     "lead": _by_lead,
     "speed": _by_speed,
     "density": _by_density,
+    "sound": _by_sound,
     "plain": _plain,
 }
 MODES = tuple(_MODES)
@@ -113,6 +119,11 @@ MODES = tuple(_MODES)
 def speed_range(speeds, max_speed: float | None) -> tuple[float, float]:
     """Return the range that mode "speed" shows [m/s]."""
     return 0.0, _upper(speeds, max_speed)
+
+
+def sound_range(sounds, top_sound: float | None) -> tuple[float, float]:
+    """Return the range that mode "sound" shows [m/s]."""
+    return 0.0, _upper(sounds, top_sound)
 
 
 def step_range(steps, longest_step: float | None) -> tuple[float, float]:
@@ -141,19 +152,21 @@ def colour_by(
     densities=None,
     steps=None,
     leads=None,
+    sounds=None,
     rest_density: float = 1000.0,
     max_speed: float | None = None,
     longest_step: float | None = None,
+    top_sound: float | None = None,
     palette: str = "default",
     doubling: bool = False,
 ) -> np.ndarray:
-    """Return (N, 3) float32 colours; `mode` is one of `MODES`, speeds are in m/s, densities in kg/m^3, the others in s."""
+    """Return (N, 3) float32 colours; `mode` is one of `MODES`, speeds, sounds [m/s], densities [kg/m^3], steps, leads [s]."""
     choose = _choose("colour mode", mode, _MODES)
-    given = [values for values in (levels, speeds, densities, steps, leads) if values is not None]
+    given = [values for values in (levels, speeds, densities, steps, leads, sounds) if values is not None]
     if not given:
         raise RenderError(
             f"colour mode {mode!r} got no array, and needs at least one to know the number of particles: "
-            "pass levels=, speeds=, densities=, steps= or leads="
+            "pass levels=, speeds=, densities=, steps=, leads= or sounds="
         )
     return choose(
         levels=levels,
@@ -161,9 +174,11 @@ def colour_by(
         densities=densities,
         steps=steps,
         leads=leads,
+        sounds=sounds,
         rest_density=rest_density,
         max_speed=max_speed,
         longest_step=longest_step,
+        top_sound=top_sound,
         palette=palette,
         doubling=doubling,
         count=len(given[0]),

@@ -14,7 +14,7 @@ from taichi_rts.rendering.splatter import Splatter
 from taichi_rts.scene import Scene
 from taichi_rts.simulation import Simulation
 
-Mode = Literal["level", "step", "lead", "speed", "density", "plain"]
+Mode = Literal["level", "step", "lead", "speed", "density", "sound", "plain"]
 BAR_STEPS = 64
 LEGEND_ROWS = 8  # with more levels than that the legend leaves out those that nobody has
 
@@ -86,9 +86,11 @@ class Painter:
             densities=rho,
             steps=sim.steps() if mode == "step" else None,
             leads=sim.leads() if mode == "lead" else None,
+            sounds=sim.sound_speeds() if mode == "sound" else None,
             rest_density=self.scene.rest_density,
             max_speed=self.top_speed,
             longest_step=longest_lead(sim) if mode == "lead" else longest_step(sim),
+            top_sound=self.scene.viscous_wave_speed,
             palette=self.options.palette,
             doubling=sim.schedule.levels_double,
         )
@@ -131,6 +133,12 @@ class Painter:
         tints = colours.colour_by("speed", speeds=values, max_speed=self.top_speed)
         return legend.draw_colour_bar(image, "speed", 0.0, self.top_speed, "m/s", tints)
 
+    def _sound_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
+        lower, upper = colours.sound_range([], self.scene.viscous_wave_speed)
+        values = np.linspace(lower, upper, BAR_STEPS)
+        tints = colours.colour_by("sound", sounds=values, top_sound=upper)
+        return legend.draw_colour_bar(image, "sound speed", lower, upper, "m/s", tints)
+
     def _density_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
         lower, upper = colours.density_range(self.scene.rest_density)
         values = np.linspace(lower, upper, BAR_STEPS)
@@ -143,6 +151,7 @@ _BARS = {
     "lead": Painter._lead_bar,
     "speed": Painter._speed_bar,
     "density": Painter._density_bar,
+    "sound": Painter._sound_bar,
 }
 
 

@@ -103,13 +103,16 @@ class Asynchronous:
 
     def longest_step(self, scene: Scene) -> float:
         """The longest step [s] that any cell may take: with all equal the one that all may take."""
-        acoustic = criteria.acoustic_step(self.longest_courant, scene.support, scene.wave_speed)
+        slowest = scene.wave_speed if self.levels == 1 else scene.least_wave_speed
+        acoustic = criteria.acoustic_step(self.longest_courant, scene.support, slowest)
         return min(acoustic, criteria.scene_viscous_step(scene, most=self.levels == 1))
 
     def ticks(self, scene: Scene) -> int:
-        """Ticks in the longest step: `levels`, doubled until one tick is within the viscous limit of every fluid."""
-        ticks, longest, viscous = self.levels, self.longest_step(scene), criteria.scene_viscous_step(scene)
-        while self.levels > 1 and longest / ticks > viscous:
+        """Ticks in the longest step: `levels`, doubled until one tick is within the limits of every fluid and sound speed."""
+        ticks, longest = self.levels, self.longest_step(scene)
+        acoustic = criteria.acoustic_step(self.longest_courant, scene.support, scene.wave_speed)
+        shortest = min(criteria.scene_viscous_step(scene), acoustic * (1.0 + 1e-9))
+        while self.levels > 1 and longest / ticks > shortest:
             ticks *= 2
         return ticks
 
@@ -146,7 +149,8 @@ class AsynchronousSchedule(Cells):
         self.staggered = stepper.stagger is not None
         self.seed = stepper.stagger or 0
         self.limiter = NeighbourLimiter(doubling=True, aligned=self.powers_of_two)
-        self.slow_speed = criteria.MACH * scene.wave_speed
+        self.slow_speed = criteria.MACH * scene.least_wave_speed
+        self.by_sound = scene.regional_sound is not None
         self.viscous_reach = criteria.viscous_step(scene.support, 1.0) * (1.0 + 1e-6)  # [m^2]
         self.drift_time = ti.field(float, ())
         self.passes = ti.field(ti.i32, ())
@@ -196,7 +200,7 @@ class AsynchronousSchedule(Cells):
 
         On a GPU as many passes as the last cycle needed are launched without looking; idle ones change nothing.
         """
-        self.needs_sorting = needs_sorting
+        self.needs_sorting = self.needs_sound = needs_sorting
         self.launched += 1
         if self.launched == LOG:
             self.collect_widths()
@@ -252,6 +256,8 @@ class AsynchronousSchedule(Cells):
 
     def observe(self, now: int, tick: float) -> None:
         """Give the cells that stepped their next step, and wake neighbours whose step is too long beside it."""
+        if self.by_sound:
+            self.sound.update_some(self, tick)
         self.propose_steps(now, tick, self.fast_reach)
         self.assign_steps()
         self.wake_neighbours(now)
@@ -268,9 +274,10 @@ class AsynchronousSchedule(Cells):
             if self.block_due[block] > 0:
                 time = self.time[block]
                 speed2, acceleration2, viscosity, density = self.maxima.of(block, time, tick)
-                wanted = self.longest_step(
-                    tick, fast_reach, ti.sqrt(speed2), ti.sqrt(acceleration2), viscosity, criteria.stiffening(density)
-                )
+                sound = criteria.stiffening(density) * self.scene.wave_speed
+                if ti.static(self.by_sound):
+                    sound = self.sound.limit[block]
+                wanted = self.longest_step(tick, fast_reach, ti.sqrt(speed2), ti.sqrt(acceleration2), viscosity, sound)
                 if ti.static(self.staggered):
                     if step == 0:
                         wanted = 1 + ti.cast(self.noise(block) % ti.cast(wanted, ti.u32), ti.i32)
@@ -282,15 +289,15 @@ class AsynchronousSchedule(Cells):
             self.proposal[block] = step
 
     @ti.func
-    def longest_step(self, tick, fast_reach, speed, acceleration, viscosity, stiffening):
+    def longest_step(self, tick, fast_reach, speed, acceleration, viscosity, sound):
         """Smallest of the CFL limit, the force and viscous limits and the longest step, rounded down to >= 1 tick.
 
-        The CFL limit is `fast_reach` [m] over the sum of |v| and the local sound speed `stiffening` c_s.
+        The CFL limit is `fast_reach` [m] over the sum of |v|, where it exceeds Mach 0.1, and the local sound speed [m/s].
         """
         step = ti.cast(self.levels, float)
-        if speed > self.slow_speed or stiffening > 1.0:
-            signal = criteria.signal_speed(self.scene.wave_speed, stiffening, ti.max(speed, self.slow_speed))
-            step = ti.min(step, fast_reach / (signal * tick))
+        slow = criteria.MACH * sound if ti.static(self.by_sound) else self.slow_speed
+        if speed > slow or sound > self.scene.least_wave_speed:
+            step = ti.min(step, fast_reach / ((sound + ti.max(speed, slow)) * tick) * (1.0 + 1e-6))
         if acceleration > 0.0:
             step = ti.min(step, self.stepper.lambda_f * ti.sqrt(self.scene.support / acceleration) / tick)
         if viscosity > 0.0:

@@ -54,6 +54,8 @@ class Schedule:
         levels: number of levels; level n steps every n base steps.
         levels_double: whether steps come in octaves rather than one by one, which is how pictures and tables group them.
         needs_sorting: whether the grid has to be sorted before the present step.
+        sound: the rule of the regional sound speed (`SoundRule`), or None; `needs_sound` says whether it has to be worked out
+            before the present step.
         steps: base steps begun so far.
         debug: check at run time what is true by construction.
     """
@@ -62,6 +64,8 @@ class Schedule:
     levels_double = False
     base_ticks = 1
     needs_sorting = True
+    needs_sound = True
+    sound: Any = None
 
     def __init__(self, particles: Particles, grid: BlockGrid) -> None:
         self.particles = particles

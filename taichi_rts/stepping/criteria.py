@@ -51,7 +51,7 @@ def stiffening(density_ratio):
 
 
 @ti.func
-def signal_speed(sound_speed: ti.template(), stiffening, speed):
+def signal_speed(sound_speed, stiffening, speed):
     """Speed [m/s] that takes the place of c_s in Eq. 1: c + |v|, signals carried along by the fluid (Monaghan 1992)."""
     return sound_speed * stiffening + speed
 

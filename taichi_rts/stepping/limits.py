@@ -45,12 +45,19 @@ class BlockMaxima:
                 viscosity = ti.max(viscosity, self.particles.viscosity[i])
         if ti.static(not self.particles.has_viscosity):
             viscosity = self.viscosity
+        speed2 = ti.max(speed2, self.wall_speed2(block))
+        return speed2, acceleration2, viscosity, density / self.rest_density
+
+    @ti.func
+    def wall_speed2(self, block):
+        """Square of the largest speed [m^2/s^2] of the moving faces that the block may meet."""
+        speed2 = 0.0
         for wall in ti.static(self.walls):
             low = self.lower(block, wall[0])
             if wall[1] < low + ti.static(2.0 * self.geometry.sides[wall[0]]):
                 if low - ti.static(self.geometry.sides[wall[0]]) < wall[2]:
                     speed2 = ti.max(speed2, wall[3] * wall[3])
-        return speed2, acceleration2, viscosity, density / self.rest_density
+        return speed2
 
     @ti.func
     def lower(self, block, axis: ti.template()):

@@ -1,6 +1,7 @@
 """Regional time stepping (Goswami & Batty 2014): every block of side r steps at n base steps."""
 
 import math
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
 import taichi as ti
@@ -25,15 +26,41 @@ LARGEST_COURANT = 0.4
 uniform steps. Still pools stay calm up to 0.6 on average, though single ones differ by 40 %; at 0.7 they move twice as much,
 at 0.8 they simmer (`docs/defaults.md`)."""
 
+MOST_LEVELS = 32
 PRESETS: dict[str | None, dict[str, Any]] = {
-    None: {"levels": 2, "strict_cfl": False, "lambda_f": 0.1},
-    "paper": {"courant": 0.4, "levels": 3, "strict_cfl": False, "lambda_f": 0.1, "limiter": False},
+    None: {"levels": 2, "strict_cfl": False, "lambda_f": 0.1, "steps": "integers"},
+    "paper": {
+        "courant": 0.4,
+        "levels": 3,
+        "strict_cfl": False,
+        "lambda_f": 0.1,
+        "limiter": False,
+        "steps": "integers",
+    },
 }
+REGIONAL_SOUND = {
+    "courant": LARGEST_COURANT,
+    "strict_cfl": False,
+    "lambda_f": 0.1,
+    "limiter": True,
+    "steps": "half_octaves",
+}
+"""What fields that are None become in a scene with a regional sound speed; `levels` follows from the range of sound speeds."""
 """The paper asks for lambda_f <= 0.25. At 0.25 a double dam break gains 2.2 % of energy, at 0.1 0.1 % (docs/defaults.md)."""
 FROM_LEVELS: dict[str, Any] = {
     "courant": lambda levels: LARGEST_COURANT / levels,
     "limiter": lambda levels: levels > 2,  # with two levels it changes nothing but the work (docs/asynchronous.md)
 }
+
+
+def lengths(steps: str, most: int) -> list[int]:
+    """Levels up to `most` that blocks may have."""
+    keep = {
+        "integers": lambda n: True,
+        "powers_of_two": lambda n: n & (n - 1) == 0,
+        "half_octaves": lambda n: n & (n - 1) == 0 or (n % 3 == 0 and (n // 3) & (n // 3 - 1) == 0),
+    }[steps]
+    return [n for n in range(1, most + 1) if keep(n)]
 
 
 @validated(StepperError)
@@ -59,10 +86,16 @@ class Regional:
             synchronised. (Waking needs none: line 12 re-evaluates whoever's block has another step.) None: on from three
             levels up, off in the paper's preset.
         inactive_density: what due particles read of others: "stale" (of the last evaluation) or "extrapolated".
+        steps: levels that blocks may have: "integers", "half_octaves" (1, 2, 3, 4, 6, 8, 12, ...) or "powers_of_two"; None: half
+            octaves with a regional sound speed. Except for integers with one sound speed, the paper's, steps end at multiples of
+            themselves, so that blocks of one level are due together.
+
+    In a scene with a regional sound speed the base step is lambda_v r over the largest sound speed, level n means that Eq. 1
+    holds for n base steps with the block's own, and Eq. 3 is left to the sound speed, which follows the velocity.
     """
 
     courant: Courant | None = None
-    levels: Annotated[int, Field(ge=1, le=16)] | None = None
+    levels: Annotated[int, Field(ge=1, le=MOST_LEVELS)] | None = None
     corrector: bool = True
     strict_cfl: bool | None = None
     preset: Literal["paper"] | None = None
@@ -74,6 +107,7 @@ class Regional:
     grading: bool = False
     limiter: bool | None = None
     inactive_density: Literal["stale", "extrapolated"] = "stale"
+    steps: Literal["integers", "half_octaves", "powers_of_two"] | None = None
 
     name: ClassVar[str] = "regional"
     keeps_past: ClassVar[bool] = False
@@ -85,6 +119,24 @@ class Regional:
         if value is None:
             value = PRESETS[self.preset].get(key)
         return FROM_LEVELS[key](self.resolved("levels")) if value is None else value
+
+    def in_scene(self, scene: Scene) -> "Regional":
+        """Return a copy in which nothing is None any more."""
+        if scene.regional_sound is None:
+            keys = ("levels", "courant", "strict_cfl", "lambda_f", "limiter", "steps")
+            settings: dict[str, Any] = {key: self.resolved(key) for key in keys}
+            return replace(self, **settings)
+        if self.preset is not None:
+            raise StepperError(
+                f"preset {self.preset!r} is for one sound speed; leave it out, or give the scene a sound_speed [m/s]"
+            )
+        ratio = scene.wave_speed / scene.least_wave_speed
+        levels = min(MOST_LEVELS, math.floor(ratio * (1.0 + 1e-9)))
+        if (self.steps or REGIONAL_SOUND["steps"]) == "powers_of_two":
+            levels = 1 << (levels.bit_length() - 1)
+        defaults: dict[str, Any] = REGIONAL_SOUND | {"levels": levels}
+        settings = {key: value for key, value in defaults.items() if getattr(self, key) is None}
+        return replace(self, **settings)
 
     @property
     def extrapolates_density(self) -> bool:
@@ -102,13 +154,14 @@ class Regional:
 
     def timeline(self, scene: Scene) -> Timeline:
         """Return a clock that ticks once a base step: lambda_v r/c_s, divided by n_max if strict."""
-        step = criteria.acoustic_step(self.resolved("courant"), scene.support, scene.wave_speed)
-        divisor = self.resolved("levels") if self.resolved("strict_cfl") else 1
+        full = self.in_scene(scene)
+        step = criteria.acoustic_step(full.resolved("courant"), scene.support, scene.wave_speed)
+        divisor = full.resolved("levels") if full.resolved("strict_cfl") else 1
         return Timeline(min(step / divisor, criteria.scene_viscous_step(scene)))
 
     def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
         """Build the schedule of Algorithm 1."""
-        return RegionalSchedule(self, scene, particles, grid)
+        return RegionalSchedule(self.in_scene(scene), scene, particles, grid)
 
 
 @ti.data_oriented
@@ -120,6 +173,7 @@ class RegionalSchedule(Schedule):
 
     def __init__(self, stepper: Regional, scene: Scene, particles: Particles, grid: BlockGrid) -> None:
         super().__init__(particles, grid)
+        self.scene = scene
         self.levels = stepper.resolved("levels")
         self.lambda_f = stepper.resolved("lambda_f")
         self.support = scene.support
@@ -137,8 +191,16 @@ class RegionalSchedule(Schedule):
         self.maxima = BlockMaxima(scene, particles, grid)
         self.beside = BlockLimiter(grid.geometry)
         self.limits = stepper.resolved("limiter")
+        self.by_sound = scene.regional_sound is not None
+        self.lengths = lengths(stepper.resolved("steps"), self.levels)
+        self.aligned = self.by_sound or stepper.resolved("steps") != "integers"
+        self.levels_double = self.aligned
         self.limiter = NeighbourLimiter(doubling=False)
+        self.until_next = ti.field(ti.i32, ())
+        self.now = 0
         self.ratio_sweeps = max(0, math.ceil(math.log2(self.levels)) - 1) if self.limits else 0
+        if self.by_sound:  # whose sound speeds are graded already; forces are not, but reach no further
+            self.ratio_sweeps = min(1, self.ratio_sweeps)
         self.grading_sweeps = max(0, self.levels - 2) if stepper.grading else 0
         self.block_level.fill(BlockLimiter.EMPTY)
         self.flag = ti.field(ti.i32, particles.capacity)
@@ -146,19 +208,35 @@ class RegionalSchedule(Schedule):
         self.due_start = ti.field(ti.i32, blocks + 1)
         self.scan = ExclusiveScan(self.block_due, self.due_start)
         self.due_count = self.scan.total
-        self.occupancy = [ti.field(ti.i32, ()) for _ in range(self.levels)]
-        self.updates = [ti.field(ti.i32, ()) for _ in range(self.levels)]
+        self.occupancy = ti.field(ti.i32, self.levels + 1)
+        self.updates = ti.field(ti.i32, self.levels + 1)
 
     def retime(self, stepper: Regional, timeline: Timeline | None = None) -> bool:
         """Take another courant."""
         self.reach = stepper.longest_courant * self.support
+        if self.scene.regional_sound is not None:
+            self.reach = stepper.in_scene(self.scene).resolved("courant") * self.support
         return True
+
+    def begin(self, timeline: Timeline, target: int) -> bool:
+        """Set the clock to the next step at which somebody may be due."""
+        begun = super().begin(timeline, target)
+        self.steps = timeline.now if begun else self.steps
+        return begun
+
+    def next_ticks(self) -> int:
+        """Ticks to the end of the first step that ends: before it nobody is due."""
+        return max(1, int(self.until_next[None])) if self.aligned else 1
 
     def select(self, now: int, tick: float) -> None:
         """Algorithm 1, lines 5-16, and the list of due particles."""
         self.determine_regions(now, tick, self.reach)
         self.apply_minimum_region()
-        self.update_validity(now)
+        if self.aligned:
+            self.update_aligned(now, now - self.now)
+        else:
+            self.update_validity(now)
+        self.now = now
         self.scan.run()
         self.compact_due()
         self.mark_read()
@@ -171,11 +249,17 @@ class RegionalSchedule(Schedule):
             level = BlockLimiter.EMPTY
             if first < end:
                 speed2, acceleration2, viscosity, density = self.maxima.of(block, now, tick)
-                level = self.region(tick, reach, speed2, acceleration2, viscosity, density)
+                if ti.static(self.by_sound):
+                    level = self.region_by_sound(tick, reach, acceleration2, viscosity, self.sound.limit[block])
+                else:
+                    level = self.region(tick, reach, speed2, acceleration2, viscosity, density)
                 if ti.static(self.limits):
                     before = self.block_level[block]  # of the last step; who was empty has nothing to grow from
                     if before != BlockLimiter.EMPTY:
-                        level = self.limiter.settled(level, before, now)
+                        if ti.static(self.aligned):
+                            level = self.grown(level, before, now)
+                        else:
+                            level = self.limiter.settled(level, before, now)
             self.raw_level[block] = level
 
     @ti.func
@@ -196,9 +280,34 @@ class RegionalSchedule(Schedule):
                             level = n
         return level
 
+    @ti.func
+    def grown(self, wanted, before, now):
+        """Level of a block that had another: less at once, more only by one of `lengths`, at a multiple of it."""
+        level = wanted
+        if wanted > before:
+            level = before
+            for k in ti.static(range(len(self.lengths) - 1)):
+                if before == self.lengths[k] and now % self.lengths[k + 1] == 0:
+                    level = self.lengths[k + 1]
+        return level
+
+    @ti.func
+    def region_by_sound(self, base_step, reach, acceleration2, viscosity, sound):
+        """The largest level for which Eq. 1 holds with the block's own sound speed [m/s], Eq. 2 and the viscous limit."""
+        level = 1
+        for n in ti.static(range(2, self.levels + 1)):
+            if ti.static(n in self.lengths):
+                step = base_step * n
+                if criteria.allows_force(step, self.lambda_f, self.support, acceleration2):
+                    if criteria.allows_viscosity(step, self.support, viscosity):
+                        if step * sound <= reach * (1.0 + 1e-6):
+                            level = n
+        return level
+
     def apply_minimum_region(self) -> None:
         """R_min of Section 3, then the sweeps of the limiter and of grading, which spread by a block each."""
-        self.beside.limit(self.raw_level, self.block_level, 1, 0)
+        reach = NeighbourLimiter.RATIO if self.by_sound else 1  # the sound speed has spread by a block already
+        self.beside.limit(self.raw_level, self.block_level, reach, 0)
         for factor, jump in self.ratio_sweeps * [(NeighbourLimiter.RATIO, 0)] + self.grading_sweeps * [(1, 1)]:
             self.beside.limit(self.block_level, self.raw_level, factor, jump)
             self.beside.limit(self.raw_level, self.block_level, factor, jump)
@@ -219,11 +328,37 @@ class RegionalSchedule(Schedule):
                     self.particles.level[i] = level
                 self.flag[k] = flag
                 count += flag
-            self.block_due[block] = count
-            for n in ti.static(range(self.levels)):
-                here = ti.cast(level == n + 1, ti.i32)
-                self.occupancy[n][None] += here * (end - first)
-                self.updates[n][None] += here * count
+            self.count(block, level, end - first, count, 1)
+
+    @ti.kernel
+    def update_aligned(self, now: ti.i32, passed: ti.i32):
+        """The same where steps end at multiples of themselves: due are the blocks whose level divides `now`.
+
+        And at once the particles whose step has become shorter. Whose step has become longer goes on to its end. `passed` ticks
+        have gone by since the last call.
+        """
+        self.until_next[None] = self.levels
+        for block in range(self.blocks):
+            first, end = self.grid.first(block), self.grid.first(block + 1)
+            level = self.block_level[block]
+            count = 0
+            for k in range(first, end):
+                i = self.grid.order[k]
+                flag = ti.cast(now % level == 0 or level < self.particles.level[i], ti.i32)
+                self.particles.level[i] = level
+                self.flag[k] = flag
+                count += flag
+            if first < end:
+                ti.atomic_min(self.until_next[None], level - now % level)
+            self.count(block, level, end - first, count, passed)
+
+    @ti.func
+    def count(self, block, level, particles, due, passed):
+        """Note how many of a block's particles are due, and for the statistics how many have which level."""
+        self.block_due[block] = due
+        if particles > 0:
+            self.occupancy[level] += particles * passed
+            self.updates[level] += due
 
     @ti.kernel
     def compact_due(self):
@@ -249,7 +384,7 @@ class RegionalSchedule(Schedule):
 
     def take_counts(self) -> tuple[list[int], list[int]]:
         """Return particles and updates per level since the last call."""
-        counts = ([int(f[None]) for f in self.occupancy], [int(f[None]) for f in self.updates])
-        for field in (*self.occupancy, *self.updates):
-            field[None] = 0
+        counts = self.occupancy.to_numpy()[1:].tolist(), self.updates.to_numpy()[1:].tolist()
+        self.occupancy.fill(0)
+        self.updates.fill(0)
         return counts

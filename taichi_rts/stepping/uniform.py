@@ -89,8 +89,8 @@ class AdaptiveSchedule(UniformSchedule):
         super().__init__(particles, grid)
         self.scene = scene
         self.retime(stepper, timeline)
-        self.base_ticks = SUBDIVISIONS
-        self.sound_speed = scene.wave_speed
+        self.base_ticks = round(SUBDIVISIONS * scene.wave_speed / scene.least_wave_speed)
+        self.least_sound_speed = scene.least_wave_speed
         self.rest_density = scene.rest_density
         self.signal = ti.field(float, ())
         self.acceleration2 = ti.field(float, ())
@@ -103,12 +103,14 @@ class AdaptiveSchedule(UniformSchedule):
 
     @ti.kernel
     def reduce_maxima(self):
-        self.signal[None] = self.sound_speed
+        self.signal[None] = self.least_sound_speed
         self.acceleration2[None] = 0.0
         for i in range(self.particles.alive[None]):
-            stiffening = criteria.stiffening(self.particles.rho[i] / self.rest_density)
-            speed = self.particles.v[i].norm()
-            ti.atomic_max(self.signal[None], criteria.signal_speed(self.sound_speed, stiffening, speed))
+            sound, reference = self.scene.wave_speed, self.rest_density
+            if ti.static(self.particles.has_sound):
+                sound, reference = self.particles.sound[i], self.particles.reference[i]
+            stiffening = criteria.stiffening(self.particles.rho[i] / reference)
+            ti.atomic_max(self.signal[None], criteria.signal_speed(sound, stiffening, self.particles.v[i].norm()))
             ti.atomic_max(self.acceleration2[None], self.particles.a[i].norm_sqr())
 
     def observe(self, now: int, tick: float) -> None:
@@ -118,7 +120,7 @@ class AdaptiveSchedule(UniformSchedule):
     def next_ticks(self) -> int:
         """Ticks of the next step: the smallest of Eq. 1 with c + |v|, Eq. 2 and the fixed step."""
         signal, acceleration = self.signal[None], math.sqrt(self.acceleration2[None])
-        walls = [self.sound_speed + wall.top_speed for wall in self.scene.moving_walls]
+        walls = [self.scene.wave_speed + wall.top_speed for wall in self.scene.moving_walls]
         support = self.scene.support
         step = min(
             criteria.acoustic_step(self.stepper.courant, support, max([signal, *walls])),

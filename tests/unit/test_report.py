@@ -23,6 +23,7 @@ PASSES |= {"clamped": 12, "extrapolations": 0}
 def simulation(stepper, particles, updates, **more):
     statistics = {**STATISTICS, "level_fractions": particles, "update_fractions": updates, **more}
     return SimpleNamespace(
+        sound=None,
         stepper=stepper,
         scene=rts.load_scene("dam_break"),
         schedule=SimpleNamespace(levels_double=stepper.name == "asynchronous"),

@@ -18,7 +18,7 @@ def drifting(speeds, shift=0.0, scale=1.0):
         v = np.zeros_like(x)
         v[:, 0] = speed * scale
         moved = x + np.array([0.01 * k + (shift if k else 0.0), 0.0])
-        run.append(k, moved, v, np.full(len(x), 1000.0), (speed**2, 2.0 * speed, 0.0))
+        run.append(k, moved, v, np.full(len(x), 1000.0), np.zeros(len(x)), (speed**2, 2.0 * speed, 0.0))
     return run
 
 
@@ -74,9 +74,9 @@ def test_density_compares_compression_only():
 def test_pressure_at_probes_is_a_weighted_mean():
     run = drifting([1.0, 1.0])
     scale = Yardstick.of(SCENE, run)
-    run.densities[1] = np.full(100, 1010.0)
-    inside = (scale.probes[:, 0] < 1.1) & (scale.probes[:, 1] < 1.1)
     expected = scale.medium.equation_of_state.pressure_numpy(1010.0)
+    run.pressures[1] = np.full(100, expected)
+    inside = (scale.probes[:, 0] < 1.1) & (scale.probes[:, 1] < 1.1)
     np.testing.assert_allclose(measures.probe_pressures(run, 1, scale)[inside], expected)
     assert (measures.probe_pressures(run, 1, scale)[~inside] == 0.0).all()
     assert 3 <= inside.sum() < len(inside)
@@ -106,11 +106,11 @@ def test_particles_that_only_one_run_has_are_left_out():
 
 def test_a_trajectory_survives_its_file():
     run = drifting([0.0, 1.0])
-    run.append(2.0, np.zeros((3, 2)), np.ones((3, 2)), np.ones(3), (1.0, 2.0, 3.0))
+    run.append(2.0, np.zeros((3, 2)), np.ones((3, 2)), np.ones(3), np.ones(3), (1.0, 2.0, 3.0))
     read = Trajectory.from_bytes(run.to_bytes())
     assert read.times == run.times
     assert read.energies == run.energies
-    for name in ("positions", "velocities", "densities"):
+    for name in ("positions", "velocities", "densities", "pressures"):
         for one, two in zip(getattr(read, name), getattr(run, name), strict=True):
             np.testing.assert_array_equal(one, two)
 

@@ -49,7 +49,7 @@ def test_the_sources_of_the_solver_count_and_others_do_not(tmp_path):
 
 def test_a_stored_reference_is_found_and_a_broken_one_is_not(tmp_path):
     run = Trajectory()
-    run.append(0.0, np.zeros((3, 2)), np.ones((3, 2)), np.ones(3), (0.0, 1.0, 2.0))
+    run.append(0.0, np.zeros((3, 2)), np.ones((3, 2)), np.ones(3), np.ones(3), (0.0, 1.0, 2.0))
     references.store(tmp_path, "key", run)
     assert references.load(tmp_path, "key").energies == [(0.0, 1.0, 2.0)]
     assert references.load(tmp_path, "other") is None

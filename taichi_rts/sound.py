@@ -1,0 +1,32 @@
+"""How stiff the fluid is, region by region: the description. The rule itself is `physics.sound_rule`."""
+
+from __future__ import annotations
+
+from pydantic.dataclasses import dataclass
+
+from taichi_rts.errors import SceneError
+from taichi_rts.validation import FROZEN, Positive, validated
+
+FLOOR = 6.8
+"""Floor of the regional sound speed over sqrt(g H): water at rest would be compressed by 1/6.8^2 = 2.2 % at the bottom."""
+
+
+@validated(SceneError)
+@dataclass(frozen=True, config=FROZEN)
+class RegionalSound:
+    """Every block of the grid has the sound speed that the flow in it and beside it needs.
+
+    Attributes:
+        mach: largest local Mach number, and root of the largest compression: the sound speed is 1/mach times the largest speed
+            nearby, and 1/mach times sqrt(p/rho_0).
+        floor: smallest sound speed [m/s]; None: 6.8 sqrt(g H), H being the largest depth of the scene's fluids, one on top of
+            the other.
+        cap: largest sound speed [m/s], which sets the base step; None: twenty times an estimate of the largest speed.
+        memory: over how many crossing times r/c of a block the sound speed falls once it may, and the reference density
+            relaxes.
+    """
+
+    mach: Positive = 0.1
+    floor: Positive | None = None
+    cap: Positive | None = None
+    memory: Positive = 25.0
