@@ -181,7 +181,7 @@ class Scene:
 
     @property
     def depth_potential(self) -> float:
-        """Product g H [m^2/s^2], H being the largest depth of the fluids, one on top of the other, under any gravity of the run."""
+        """Product g H [m^2/s^2], H being the largest depth of the fluids, one on top of the other, under any gravity."""
         return max(self._stack(gravity) for gravity in (self.acceleration, *(c.gravity for c in self.gravity_changes)))
 
     def _stack(self, gravity: tuple[float, ...]) -> float:
