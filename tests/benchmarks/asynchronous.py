@@ -61,7 +61,7 @@ def checks():
 
 def projectile():
     """Kinetic energy over its start while a block at 0.5 c_s enters a pool, against a run at a very small step."""
-    scene, times = rts.load_scene("projectile", spacing=0.05), (0.01, 0.02, 0.04, 0.06, 0.1)
+    scene, times = rts.load_scene("projectile", spacing=0.05, sound_speed=40.0), (0.01, 0.02, 0.04, 0.06, 0.1)
     variants = {
         "uniform 0.8": rts.Uniform(courant=0.8),
         "uniform 0.6": rts.Uniform(courant=0.6),
