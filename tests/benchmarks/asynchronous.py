@@ -130,7 +130,10 @@ def momentum():
         row(name, *(f"{value:+.1e}" for value in drift))
 
 
-SPEED = {"double_dam_break": (0.04, 0.34, 0.40), "projectile": (0.03, 0.0, 0.02)}
+SPEED = {
+    "double_dam_break": (0.34, 0.40, {"spacing": 0.04}),
+    "projectile": (0.0, 0.02, {"spacing": 0.03, "sound_speed": 40.0}),
+}
 SPEED_STEPPERS = {"uniform at the smallest cell step": rts.Uniform(courant=0.05)} | STEPPERS
 
 
@@ -142,8 +145,8 @@ def speed():
 
 
 def _speed():
-    for name, (spacing, start, end) in SPEED.items():
-        scene = rts.load_scene(name, spacing=spacing)
+    for name, (start, end, changes) in SPEED.items():
+        scene = rts.load_scene(name, **changes)
         print(f"\n{name}, t = {start:g} to {end:g} s, {os.environ[SECTION_THREADS]} thread(s)\n")
         head(
             "stepper",
