@@ -37,7 +37,8 @@ class Particles:
             regional.
         guided_until: the tick until which an inflow prescribes the velocity.
         budget: in debug runs, `wall_push`, the velocity [m/s] that walls have given a particle so far, and `a_walls`, their
-            share of its acceleration; `work` [J/kg] that moving walls and inflows have done on it, and its `power` [W/kg].
+            share of its acceleration; `work` [J/kg] that moving walls and inflows have done on it, and its `power` [W/kg]; with
+            a regional sound speed `sound_work` [J/kg], what its changes have put into the energy of compression.
     """
 
     def __init__(
@@ -96,6 +97,8 @@ class Particles:
             self.a_walls, self.wall_push, self.work, self.power = vector(), vector(), scalar(), scalar()
             if self.has_past:
                 self.past_wall_push = vector()
+            if self.has_sound:
+                self.sound_work = scalar()
         self.real_scratch = ti.field(backend.dtype, self.capacity)
         self.integer_scratch = ti.field(ti.i32, self.capacity)
         unborn = ((0, self.capacity - count), (0, 0))

@@ -310,6 +310,17 @@ class Simulation:
             total += self.medium.mass * float(done.sum()) + (self.inflows.energy if self.inflows else 0.0)
         return total
 
+    def sound_work(self) -> float:
+        """Energy [J] that changes of the regional sound speed and of reference densities have put in; negative if taken out.
+
+        A particle that becomes stiffer under the same pressure holds less energy. Needs a debug run, else raises `Error`.
+        """
+        if self.sound is None:
+            return 0.0
+        if not self.particles.has_budget:
+            raise Error("the work of changes of the sound speed needs Simulation(..., debug=True)")
+        return self.medium.mass * float(self.particles.to_numpy(self.particles.sound_work).astype(float).sum())
+
     def momentum(self) -> np.ndarray:
         """Total momentum [kg m/s], (dim,), at `time`."""
         return self.medium.mass * self.velocities().astype(np.float64).sum(axis=0)

@@ -46,6 +46,8 @@ class FloatingReference(Tait):
     def adapt(self, i, block, rho, elapsed):
         """Take note that particle `i` in `block` now has density `rho` [kg/m^3], `elapsed` [s] after its last evaluation."""
         pressure = self.pressure_of(i, rho)
+        if ti.static(self.particles.has_budget):
+            self.particles.sound_work[i] -= self.energy_of(i, rho)
         before = self.particles.sound[i]
         fallen = before / (1.0 + before * elapsed * self.rule.forgetting)
         self.particles.sound[i] = ti.max(self.rule.target[block], fallen)
@@ -53,6 +55,14 @@ class FloatingReference(Tait):
             self.particles.reference[i] = rho * ti.pow(1.0 + pressure / self.stiffness_of(i), -1.0 / 7.0)
         share = ti.min(1.0, self.particles.sound[i] * elapsed * self.rule.forgetting)
         self.particles.reference[i] += share * (self.rest_density - self.particles.reference[i])
+        if ti.static(self.particles.has_budget):
+            self.particles.sound_work[i] += self.energy_of(i, rho)
+
+    @ti.func
+    def energy_of(self, i, rho):
+        """Energy of compression [J/kg] as `specific_energy` gives it, expanded about rho_ref so that no digits cancel."""
+        s = ti.max(rho / self.particles.reference[i] - 1.0, 0.0)
+        return self.stiffness_of(i) / self.particles.reference[i] * s * s * (3.5 + s * (7.0 / 3.0 + 3.5 * s))
 
     def pressure_numpy(self, rho: Any) -> Any:
         """Pressure [Pa], (N,), of the particles at densities `rho` [kg/m^3], (N,), by particle id."""
