@@ -1,0 +1,188 @@
+"""What the regional sound speed saves, and what it costs in accuracy: the figures of docs/regional_sound_speed.md.
+
+python tests/benchmarks/regional_sound.py [speed|extremes|rule ...] [--particles 100k] [--scenes projectile,...]
+speed takes about 25 minutes on 2 idle cores at 100k particles, the others a few minutes at their 6k.
+"""
+
+import dataclasses
+import sys
+from typing import Any
+
+import numpy as np
+import tyro
+
+import taichi_rts as rts
+
+SCENES = "projectile,water_jet,dam_break_drop,double_dam_break,martin_moyce"
+SAMPLES = 60
+
+
+def head(*cells):
+    """Print the head of a table."""
+    print("\n| " + " | ".join(cells) + " |\n" + "|---" * len(cells) + "|", flush=True)
+
+
+def row(*cells):
+    """Print a row of a table."""
+    print("| " + " | ".join(map(str, cells)) + " |", flush=True)
+
+
+@dataclasses.dataclass
+class Seen:
+    """What a run had at its samples: curves over time, and its costs."""
+
+    height: list[float] = dataclasses.field(default_factory=list)
+    kinetic: list[float] = dataclasses.field(default_factory=list)
+    mach: list[float] = dataclasses.field(default_factory=list)
+    density: list[float] = dataclasses.field(default_factory=list)
+    dense: list[float] = dataclasses.field(default_factory=list)
+    speed: float = 0.0
+    count: int = 0
+    updates: int = 0
+    wall: float = 0.0
+    runaways: int = 0
+
+
+def run(scene, stepper, samples=SAMPLES):
+    """Run `scene` to its end."""
+    sim, seen = rts.Simulation(scene, stepper), Seen()
+    for time in np.linspace(0.0, scene.end_time, samples + 1)[1:]:
+        sim.advance_to(time)
+        x, v, rho, _ = sim.state()
+        speed = np.linalg.norm(v, axis=1)
+        seen.height.append(float(x[:, 1].mean()))
+        seen.kinetic.append(sim.energy().kinetic)
+        seen.mach.append(float((speed / sim.sound_speeds()).max()))
+        seen.density.append(float(rho.max()) / scene.rest_density)
+        seen.dense.append(float((rho > 1.03 * scene.rest_density).mean()))
+        seen.speed = max(seen.speed, float(speed.max()))
+    statistics = sim.statistics
+    seen.count, seen.updates = sim.count, statistics["particle_updates"]
+    seen.wall, seen.runaways = statistics["wall_seconds"], statistics["runaways"]
+    return seen
+
+
+def difference(one, other, scale):
+    """Rms difference of two curves over `scale`."""
+    return float(np.sqrt(np.mean((np.asarray(one) - np.asarray(other)) ** 2))) / scale
+
+
+def speed(names: list[str], particles: str, courants: list[float]) -> None:
+    """Updates and wall time of full runs, against uniform steps with one sound speed."""
+    for name in names:
+        scene = rts.load_scene(name, particles=particles)
+        regional = scene.replace(sound_speed="regional")
+        head("run", "λ", "updates [M]", "saved", "wall [s]", "faster", "Δy", "Δ kinetic", "v_max", "limited")
+        for courant in courants:
+            base = None
+            for label, where, stepper in (
+                ("uniform", scene, rts.Uniform(courant)),
+                ("uniform, regional c", regional, rts.Uniform(courant, adaptive=True)),
+                ("regional, regional c", regional, rts.Regional(courant=courant)),
+                ("asynchronous, regional c", regional, rts.Asynchronous(courant=courant)),
+            ):
+                seen = run(where, stepper, 20)
+                base = base or seen
+                row(
+                    f"{name}, {seen.count:,}: {label}",
+                    courant,
+                    f"{seen.updates / 1e6:.1f}",
+                    f"{base.updates / seen.updates:.2f}x",
+                    f"{seen.wall:.1f}",
+                    f"{base.wall / seen.wall:.2f}x",
+                    f"{difference(seen.height, base.height, np.ptp(base.height)):.2%}",
+                    f"{difference(seen.kinetic, base.kinetic, max(base.kinetic)):.2%}",
+                    f"{seen.speed:.1f}",
+                    seen.runaways,
+                )
+
+
+def extremes(names: list[str], particles: str, courants: list[float]) -> None:
+    """Largest Mach numbers and densities over the run."""
+    head(
+        "scene",
+        "run",
+        "largest Mach",
+        "largest density: median of samples",
+        "99 %",
+        "most particles above 1.03",
+        "v_max",
+    )
+    for name in names:
+        scene = rts.load_scene(name, particles=particles)
+        for label, where, stepper in (
+            ("uniform", scene, rts.Uniform(courants[0])),
+            ("regional c", scene.replace(sound_speed="regional"), rts.Regional(courant=courants[0])),
+        ):
+            seen = run(where, stepper, 200)
+            row(
+                name,
+                label,
+                f"{max(seen.mach):.3f}",
+                f"{np.median(seen.density):.3f}",
+                f"{np.percentile(seen.density, 99):.3f}",
+                f"{max(seen.dense):.2%}",
+                f"{seen.speed:.1f} (estimated {scene.estimate_max_speed():.1f})",
+            )
+
+
+VARIANTS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "as it is": ({}, {}),
+    "mach 0.15": ({"mach": 0.15}, {}),
+    "memory 5": ({"memory": 5.0}, {}),
+    "memory 100": ({"memory": 100.0}, {}),
+    "floor 1 m/s": ({"floor": 1.0}, {}),
+    "powers of two": ({}, {"steps": "powers_of_two"}),
+    "integers": ({}, {"steps": "integers"}),
+    "density carried": ({}, {"inactive_density": "extrapolated"}),
+    "no limiter": ({}, {"limiter": False}),
+}
+
+
+def rule(names: list[str], particles: str, courants: list[float]) -> None:
+    """What each part of the rule and of the levels is worth."""
+    for name in names:
+        scene = rts.load_scene(name, particles=particles)
+        head("variant", "updates saved", "faster", "Δy", "Δ kinetic", "largest density", "limited")
+        base = run(scene, rts.Uniform(courants[0]))
+        exact = run(scene, rts.Uniform(0.1))
+        scale = np.ptp(exact.height)
+        for label, seen in [("uniform", base)] + [
+            (
+                label,
+                run(
+                    scene.replace(sound_speed=rts.RegionalSound(**sound)), rts.Regional(courant=courants[0], **options)
+                ),
+            )
+            for label, (sound, options) in VARIANTS.items()
+        ]:
+            row(
+                f"{name}: {label}",
+                f"{base.updates / seen.updates:.2f}x",
+                f"{base.wall / seen.wall:.2f}x",
+                f"{difference(seen.height, exact.height, scale):.2%}",
+                f"{difference(seen.kinetic, exact.kinetic, max(exact.kinetic)):.2%}",
+                f"{max(seen.density):.3f}",
+                seen.runaways,
+            )
+
+
+PARTS = {part.__name__: part for part in (speed, extremes, rule)}
+
+
+def main(
+    parts: tyro.conf.Positional[tuple[str, ...]] = tuple(PARTS),
+    particles: str | None = None,
+    scenes: str = SCENES,
+    courants: str = "0.6",
+    arch: str = "cpu",
+) -> None:
+    """Run the parts."""
+    rts.init(arch, "f32")
+    for part in parts:
+        count = particles or ("100k" if part == "speed" else "6k")
+        PARTS[part](scenes.split(","), count, [float(courant) for courant in courants.split(",")])
+
+
+if __name__ == "__main__":
+    sys.exit(tyro.cli(main))
