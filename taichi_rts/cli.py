@@ -69,8 +69,8 @@ class Run:
     """Initial particle spacing [m]."""
     particles: str | None = None
     """Number of fluid particles instead of a spacing, e.g. 30k or 1.5M."""
-    sound_speed: float | Literal["regional"] | None = None
-    """Sound speed [m/s], or regional; by default ten times the largest speed the scene suggests."""
+    sound_speed: float | Literal["regional", "auto"] | None = None
+    """Sound speed [m/s], or regional, or auto; by default ten times the largest speed the scene suggests."""
     end_time: float | None = None
     """Physical time to run to [s]; by default the scene's own."""
     export_fps: float = 60.0

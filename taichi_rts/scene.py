@@ -30,6 +30,8 @@ else:
     import tomli as tomllib
 
 LARGEST_RATIO = 32.0  # of sound speeds in one scene
+WORTHWHILE = 2.0
+"""Ratio of the one sound speed to the smallest regional one from which on regional ones pay (docs/regional_sound_speed.md)."""
 BUILT_IN = Path(__file__).parent / "scenes"
 
 
@@ -58,7 +60,7 @@ class Scene:
         gravity_changes: from each one's time on gravity is another.
         body_force: acceleration [m/s^2] added to gravity, linear in space; its gradient must be symmetric.
         sound_speed: c_s [m/s]; None: ten times an estimate of the largest speed (see `estimate_max_speed`); "regional" or a
-            `RegionalSound`: every block's own.
+            `RegionalSound`: every block's own; "auto": regional where that pays (`with_sound_for`).
         density: "summation" (over the neighbours) or "continuity" (integrated in time, with delta-SPH diffusion).
         background_pressure: [Pa] added to the equation of state; keeps fluid without a free surface from tearing.
         kernel: "cubic_spline" or "wendland_c2".
@@ -83,7 +85,7 @@ class Scene:
     gravity: Vector | None = None
     gravity_changes: tuple[GravityChange, ...] = ()
     body_force: LinearField | None = None
-    sound_speed: Positive | Literal["regional"] | RegionalSound | None = None
+    sound_speed: Positive | Literal["regional", "auto"] | RegionalSound | None = None
     density: Literal["summation", "continuity"] = "summation"
     background_pressure: NotNegative = 0.0
     kernel: Literal["cubic_spline", "wendland_c2"] = "cubic_spline"
@@ -159,8 +161,25 @@ class Scene:
         regional = self.regional_sound
         if regional is not None:
             return regional.cap if regional.cap is not None else 2.0 / regional.mach * self.estimate_max_speed()
-        assert not isinstance(self.sound_speed, (str, RegionalSound))  # for mypy
-        return self.sound_speed if self.sound_speed is not None else 10.0 * self.estimate_max_speed()
+        given = self.sound_speed
+        return float(given) if isinstance(given, (int, float)) else 10.0 * self.estimate_max_speed()
+
+    def with_sound_for(self, stepper: Any) -> Scene:
+        """Return the scene with "auto" decided for `stepper`, an object of `taichi_rts.stepping.steppers`.
+
+        Regional for steppers that can use it (`follows_sound`), where density is summed, without background pressure, and
+        where sound speeds may differ by `WORTHWHILE`; else one sound speed.
+        """
+        if self.sound_speed != "auto":
+            return self
+        regional = self.replace(sound_speed="regional") if self.bears_regional_sound else self
+        pays = stepper.follows_sound and self.wave_speed >= WORTHWHILE * regional.least_wave_speed
+        return regional if pays and self.bears_regional_sound else self.replace(sound_speed=None)
+
+    @property
+    def bears_regional_sound(self) -> bool:
+        """Whether the sound speed may be regional: it needs summed densities and no background pressure."""
+        return self.density == "summation" and self.background_pressure == 0.0
 
     @property
     def viscous_wave_speed(self) -> float:

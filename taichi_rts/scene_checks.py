@@ -26,8 +26,13 @@ def contradictions(scene: Scene) -> list[str]:
         for other in range(k):
             if len(scene.fluids[other].lower) == dim:
                 faults += _pair_faults(scene, k, other)
-    if not faults and scene.sound_speed is None and scene.estimate_max_speed() <= 0.0:
+    if not faults and not isinstance(scene.sound_speed, (int, float)) and scene.estimate_max_speed() <= 0.0:
         faults.append("sound_speed: nothing falls or moves at the start, so no default follows; give it a value [m/s]")
+    if scene.regional_sound is not None and not scene.bears_regional_sound:
+        faults.append(
+            f"sound_speed: a regional one needs density = 'summation' (now {scene.density!r}) and background_pressure 0 "
+            f"(now {scene.background_pressure:g}); change them, or give one sound speed [m/s]"
+        )
     return faults
 
 
@@ -43,7 +48,7 @@ def _body_force_faults(scene: Scene) -> list[str]:
             f"body_force: gradient {force.gradient} is not symmetric, so it has no potential energy; "
             "make gradient[d][e] equal gradient[e][d]"
         )
-    if scene.sound_speed is None:
+    if not isinstance(scene.sound_speed, (int, float)):
         faults.append(
             "sound_speed: how fast the body_force makes the fluid is not known, so no default follows; "
             "give ten times the largest speed you expect [m/s]"

@@ -58,8 +58,8 @@ class Simulation:
 
     def __init__(self, scene: Scene, stepper: Stepper | None = None, *, debug: bool = False) -> None:
         backend = backends.current()
-        self.scene = scene
         self.stepper = stepper if stepper is not None else cast(Stepper, Regional())
+        self.scene = scene = scene.with_sound_for(self.stepper)
         self.backend = backend
         start = sample(scene)
         self.medium = Medium.of(scene, start.mass)

@@ -97,6 +97,11 @@ class Asynchronous:
         """With all steps equal every sort serves for one step only."""
         return DRIFT if self.levels > 1 else 0.0
 
+    @property
+    def follows_sound(self) -> bool:
+        """With all steps equal there is nothing to follow."""
+        return self.levels > 1
+
     def make_integrator(self) -> Any:
         """Return the integrator's object: second order for any sequence of steps, corrected with the time that elapsed."""
         return Serna()

@@ -21,6 +21,10 @@ class Stepper(Protocol):
     name: str
 
     @property
+    def follows_sound(self) -> bool:
+        """Whether steps follow the sound speed of each region, so that a regional one can pay."""
+
+    @property
     def extrapolates_density(self) -> bool:
         """Whether the densities of particles that are not due follow d rho/dt, which then has to be computed."""
 

@@ -143,6 +143,11 @@ class Regional:
         """Whether d rho/dt is needed."""
         return self.inactive_density == "extrapolated" and self.resolved("levels") > 1
 
+    @property
+    def follows_sound(self) -> bool:
+        """The paper's setting has one sound speed."""
+        return self.preset is None
+
     def make_integrator(self) -> Any:
         """Return the integrator's object."""
         return Serna(self.corrector)

@@ -44,6 +44,11 @@ class Uniform:
     keeps_past: ClassVar[bool] = False
     drift: ClassVar[float] = 0.0
 
+    @property
+    def follows_sound(self) -> bool:
+        """Only the largest sound speed counts, and only if steps adapt to it."""
+        return self.adaptive
+
     def make_integrator(self) -> Any:
         """Return the integrator's object."""
         return INTEGRATORS[self.integrator]()
