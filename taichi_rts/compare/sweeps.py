@@ -68,7 +68,8 @@ def known_keys(target: str) -> list[str]:
     """Parameters of a stepper, or of the scene, that can be swept."""
     kind = Scene if target == "scene" else KINDS[target]
     return sorted(
-        set(kind.__dataclass_fields__) - {*FIXED, *SHAPE, "name", "keeps_past", "drift", "extrapolates_density", "follows_sound"}
+        set(kind.__dataclass_fields__)
+        - {*FIXED, *SHAPE, "name", "keeps_past", "drift", "extrapolates_density", "follows_sound"}
     )
 
 
