@@ -39,7 +39,7 @@ class Outcome:
         energy: largest of (total energy - work put in) over the start's; where the start has next to none, 1 + the gain over
             the scale of `energy_scale`.
         speed: largest speed [m/s].
-        courant: largest Courant number dt c_s/r of a step that was taken, that of the longest where there is one sound speed.
+        courant: Courant number dt c_s/r of the longest step that was taken, by the smallest sound speed where it is regional.
         runaways: how often a speed or an acceleration had to be limited.
         base_steps: base steps done.
     """
@@ -213,7 +213,7 @@ class _Watcher:
         density = float(rho.max()) / sim.medium.rest_density
         self.density = max(self.density, density)
         self.speed = max(self.speed, float(np.linalg.norm(v.astype(np.float64), axis=1).max()))
-        self.courant = max(self.courant, float((sim.steps() * sim.sound_speeds()).max()) / sim.medium.support)
+        self.courant = max(self.courant, float(sim.steps().max()) * sim.scene.least_wave_speed / sim.medium.support)
         work = sim.work()
         scale = energy_scale(sim, self.start, work)
         gain = (sim.energy().total - work - self.start) / scale
