@@ -21,7 +21,7 @@ from taichi_rts.errors import SceneError
 from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
 from taichi_rts.scene_checks import contradictions
 from taichi_rts.shapes import Block, Box, Fluid, Sphere, top_speed
-from taichi_rts.sound import FLOOR, RegionalSound
+from taichi_rts.sound import FLOOR, RegionalSound, SoundSpeed
 from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, describe, validated
 
 if sys.version_info >= (3, 11):
@@ -85,7 +85,7 @@ class Scene:
     gravity: Vector | None = None
     gravity_changes: tuple[GravityChange, ...] = ()
     body_force: LinearField | None = None
-    sound_speed: Positive | Literal["regional", "auto"] | RegionalSound | None = None
+    sound_speed: SoundSpeed | None = None
     density: Literal["summation", "continuity"] = "summation"
     background_pressure: NotNegative = 0.0
     kernel: Literal["cubic_spline", "wendland_c2"] = "cubic_spline"

@@ -17,7 +17,7 @@ def contradictions(scene: Scene) -> list[str]:
     dim = scene.dim
     if scene.gravity is not None and len(scene.gravity) != dim:
         faults.append(f"gravity {scene.gravity} has {len(scene.gravity)} components; the domain has {dim}")
-    faults += _body_force_faults(scene) + _condition_faults(scene)
+    faults += _sound_faults(scene) + _body_force_faults(scene) + _condition_faults(scene)
     for k, fluid in enumerate(scene.fluids):
         if len(fluid.lower) != dim:
             faults.append(f"fluids.{k}: has {len(fluid.lower)} components; the domain has {dim}")
@@ -26,12 +26,31 @@ def contradictions(scene: Scene) -> list[str]:
         for other in range(k):
             if len(scene.fluids[other].lower) == dim:
                 faults += _pair_faults(scene, k, other)
-    if not faults and not isinstance(scene.sound_speed, (int, float)) and scene.estimate_max_speed() <= 0.0:
+    if not faults and _guesses_speed(scene) and scene.estimate_max_speed() <= 0.0:
         faults.append("sound_speed: nothing falls or moves at the start, so no default follows; give it a value [m/s]")
-    if scene.regional_sound is not None and not scene.bears_regional_sound:
+    return faults
+
+
+def _guesses_speed(scene: Scene) -> bool:
+    """Whether the sound speed follows from an estimate of the largest speed."""
+    return not isinstance(scene.sound_speed, (int, float))
+
+
+def _sound_faults(scene: Scene) -> list[str]:
+    """Find what a regional sound speed does not go with."""
+    regional = scene.regional_sound
+    if regional is None:
+        return []
+    faults = []
+    if scene.density != "summation":
         faults.append(
-            f"sound_speed: a regional one needs density = 'summation' (now {scene.density!r}) and background_pressure 0 "
-            f"(now {scene.background_pressure:g}); change them, or give one sound speed [m/s]"
+            f"sound_speed: a regional one floats the density of reference, which density {scene.density!r} has no use of; "
+            "use density 'summation', or give sound_speed a value [m/s]"
+        )
+    if scene.background_pressure > 0.0:
+        faults.append(
+            f"sound_speed: a regional one knows no background_pressure, which is {scene.background_pressure:g} [Pa]; "
+            "set that to 0, or give sound_speed a value [m/s]"
         )
     return faults
 
@@ -48,7 +67,7 @@ def _body_force_faults(scene: Scene) -> list[str]:
             f"body_force: gradient {force.gradient} is not symmetric, so it has no potential energy; "
             "make gradient[d][e] equal gradient[e][d]"
         )
-    if not isinstance(scene.sound_speed, (int, float)):
+    if _guesses_speed(scene):
         faults.append(
             "sound_speed: how fast the body_force makes the fluid is not known, so no default follows; "
             "give ten times the largest speed you expect [m/s]"

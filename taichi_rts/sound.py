@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Tag, model_validator
 from pydantic.dataclasses import dataclass
 
 from taichi_rts.errors import SceneError
@@ -30,3 +33,29 @@ class RegionalSound:
     floor: Positive | None = None
     cap: Positive | None = None
     memory: Positive = 25.0
+
+    @model_validator(mode="after")
+    def _check(self) -> RegionalSound:
+        if self.floor is not None and self.cap is not None and self.floor > self.cap:
+            raise ValueError(f"floor {self.floor:g} exceeds cap {self.cap:g}; lower it, or raise the cap")
+        return self
+
+
+def _kind(data: Any) -> str:
+    """Name the kind of sound speed that `data` looks like, so that a mistake is not reported for the others as well."""
+    if isinstance(data, dict | RegionalSound):
+        return "<rule>"
+    try:
+        float(data)
+    except (TypeError, ValueError):
+        return "<word>"
+    return "<number>"
+
+
+SoundSpeed = Annotated[
+    Annotated[Positive, Tag("<number>")]
+    | Annotated[Literal["regional", "auto"], Tag("<word>")]
+    | Annotated[RegionalSound, Tag("<rule>")],
+    Discriminator(_kind),
+]
+"""One sound speed [m/s] for all, or what governs a regional one."""

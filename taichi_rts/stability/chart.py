@@ -21,7 +21,7 @@ def make_table(plan: Plan, cells: Sequence[Cell]) -> Table:
     """Return the map as a table: the largest stable courant, or with `quick` whether the default survived."""
     found = {(cell.case, cell.setting): cell for cell in cells}
     title = "survival at the defaults" if plan.quick else "largest stable courant (of the longest step)"
-    table = Table(title=title, title_justify="left")
+    table = Table(title=title, title_justify="left", caption="\n".join(notes(plan)) or None, caption_justify="left")
     table.add_column("case", no_wrap=True)
     table.add_column("density\nallowed", justify="right", no_wrap=True)
     for setting in plan.settings:
@@ -32,6 +32,18 @@ def make_table(plan: Plan, cells: Sequence[Cell]) -> Table:
         demanded = next((f"{1.05 * cell.demanded:.3f}" for cell in row if cell), "")
         table.add_row(case.name, demanded, *(mark(cell, plan.quick) for cell in row))
     return table
+
+
+def notes(plan: Plan) -> list[str]:
+    """Return a line for each reason why cells were left out."""
+    by_reason: dict[str, list[tuple[str, str]]] = {}
+    for names, reason in plan.skipped.items():
+        by_reason.setdefault(reason, []).append(names)
+    return [
+        f"left out: {', '.join(sorted({case for case, _ in names}))} with "
+        f"{', '.join(sorted({setting for _, setting in names}))}: {reason}"
+        for reason, names in by_reason.items()
+    ]
 
 
 def mark(cell: Cell | None, quick: bool) -> str:

@@ -99,7 +99,7 @@ class Stability:
         write_json(
             self.output_dir / "stability.json",
             facts
-            | {"complete": len(cells) == len(plan.cells)}
+            | {"complete": len(cells) == len(plan.cells), "left_out": chart.notes(plan)}
             | {"cases": {case.name: case.what for case in plan.cases}, "cells": [cell.plain() for cell in cells]},
         )
         write_bytes(self.output_dir / "stability.csv", chart.make_csv(cells))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
 from importlib.metadata import version
 from pathlib import Path
@@ -14,12 +15,15 @@ from typing import Any
 
 import taichi_rts as rts
 from taichi_rts.compare.executors import processes
+from taichi_rts.errors import SceneError
 from taichi_rts.output.files import write_json
+from taichi_rts.scene import Scene
 from taichi_rts.stability.cases import Case
 from taichi_rts.stability.demands import demanded_density
 from taichi_rts.stability.rerun import Rerun
 from taichi_rts.stability.survival import Outcome, largest_stable, watch
 from taichi_rts.stepping.base import Stepper
+from taichi_rts.stepping.regional import LARGEST_COURANT
 
 LOWEST, HIGHEST = 0.05, 2.0  # courants between which the largest stable one is looked for; steppers take no more than 2
 REFERENCE_COURANTS = (0.1, 0.05, 0.025)
@@ -29,12 +33,29 @@ REFERENCE_COURANTS = (0.1, 0.05, 0.025)
 class Setting:
     """A stepper with all but its courant fixed.
 
-    `make` takes a courant and returns the stepper; `default` is the courant that it has without one.
+    `make` takes a courant and returns the stepper; `default` is the courant that it has without one. `changes` are what it
+    changes in a case's scene.
     """
 
     name: str
     make: Callable[[float], Any]
     default: float
+    changes: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+
+    def scene(self, case: Case) -> Scene:
+        """Return the scene of `case` as it is run here; raises `SceneError` where that makes no sense (`unfit`)."""
+        return case.scene.replace(**self.changes) if self.changes else case.scene
+
+    def unfit(self, case: Case) -> str:
+        """Say why `case` cannot be run with this setting; empty if it can."""
+        try:
+            self.scene(case)
+        except SceneError as error:
+            return str(error).removeprefix("Scene: ")
+        return ""
+
+
+REGIONAL_SOUND = {"sound_speed": "regional"}
 
 
 SETTINGS: tuple[Setting, ...] = (
@@ -54,8 +75,11 @@ SETTINGS: tuple[Setting, ...] = (
         lambda c: rts.Asynchronous(courant=c, steps="integers"),
         rts.Asynchronous().longest_courant,
     ),
+    Setting("adaptive_c", lambda c: rts.Uniform(courant=c, adaptive=True), rts.Uniform().courant, REGIONAL_SOUND),
+    Setting("regional_c", lambda c: rts.Regional(courant=c), LARGEST_COURANT, REGIONAL_SOUND),
+    Setting("asynchronous_c", lambda c: rts.Asynchronous(courant=c), LARGEST_COURANT, REGIONAL_SOUND),
 )
-"""All steppers, in the order of the map's columns."""
+"""All steppers, in the order of the map's columns; those that end in "_c" run with the regional sound speed."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,14 +95,26 @@ class Plan:
 
     @property
     def cells(self) -> list[tuple[Case, Setting]]:
-        """All cells, case by case."""
-        return [(case, setting) for case in self.cases for setting in self.settings]
+        """All cells that can be run, case by case."""
+        return [
+            (case, setting)
+            for case in self.cases
+            for setting in self.settings
+            if (case.name, setting.name) not in self.skipped
+        ]
+
+    @functools.cached_property
+    def skipped(self) -> dict[tuple[str, str], str]:
+        """Why a case cannot be run with a setting, by the names of both."""
+        unfit = {(case.name, setting.name): setting.unfit(case) for case in self.cases for setting in self.settings}
+        return {names: reason for names, reason in unfit.items() if reason}
 
     def key(self, case: Case, setting: Setting | None) -> str:
         """Say what a stored result depends on, as a hash: scene, stepper, search and device, but not the solver's code."""
         stepper = None if setting is None else repr(setting.make(setting.default))
         search = (self.tolerance, self.quick, LOWEST, HIGHEST) if setting else REFERENCE_COURANTS
-        facts = [case.scene.to_dict(), case.samples, stepper, search, self.arch, self.precision, version("taichi_rts")]
+        scene = case.scene if setting is None else setting.scene(case)
+        facts = [scene.to_dict(), case.samples, stepper, search, self.arch, self.precision, version("taichi_rts")]
         return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
 
     def fresh(self) -> None:
@@ -159,7 +195,7 @@ def stored_cell(plan: Plan, case: Case, setting: Setting, folder: Path) -> Cell:
 
 def run_cell(plan: Plan, case: Case, setting: Setting, demanded: float) -> Cell:
     """Bisect one cell, or only try its default."""
-    scene, build = case.scene, None if plan.quick else Rerun(plan.fresh)
+    scene, build = setting.scene(case), None if plan.quick else Rerun(plan.fresh)
 
     def run(scene: rts.Scene, stepper: Stepper) -> Outcome:
         return watch(scene, stepper, samples=case.samples, demanded_density=demanded, build=build)

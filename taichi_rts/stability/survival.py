@@ -39,7 +39,7 @@ class Outcome:
         energy: largest of (total energy - work put in) over the start's; where the start has next to none, 1 + the gain over
             the scale of `energy_scale`.
         speed: largest speed [m/s].
-        courant: Courant number dt c_s/r of the longest step that was taken.
+        courant: Courant number dt c_s/r of the longest step that was taken, by the smallest sound speed where it is regional.
         runaways: how often a speed or an acceleration had to be limited.
         base_steps: base steps done.
     """
@@ -182,9 +182,9 @@ def energy_scale(sim: Simulation, start: float, work: float) -> float:
     """Energy [J] that gains are measured by: that of the start, or the work done since, where that is larger.
 
     A scene that starts with next to none (at rest without gravity, or on the floor) is measured by the kinetic energy of all
-    its fluid at Mach 0.05.
+    its fluid at Mach 0.05, of the smallest sound speed where it is regional.
     """
-    calm = 0.5 * sim.medium.mass * sim.count * (CALM_MACH * sim.medium.sound_speed) ** 2
+    calm = 0.5 * sim.medium.mass * sim.count * (CALM_MACH * sim.scene.least_wave_speed) ** 2
     return max(start, abs(work), calm)
 
 
@@ -213,7 +213,7 @@ class _Watcher:
         density = float(rho.max()) / sim.medium.rest_density
         self.density = max(self.density, density)
         self.speed = max(self.speed, float(np.linalg.norm(v.astype(np.float64), axis=1).max()))
-        self.courant = max(self.courant, float(sim.steps().max()) * sim.medium.sound_speed / sim.medium.support)
+        self.courant = max(self.courant, float(sim.steps().max()) * sim.scene.least_wave_speed / sim.medium.support)
         work = sim.work()
         scale = energy_scale(sim, self.start, work)
         gain = (sim.energy().total - work - self.start) / scale
