@@ -90,8 +90,9 @@ def compress(scene: Scene, fluid: Block | Sphere, x: np.ndarray) -> tuple[np.nda
     up = -np.asarray(scene.acceleration) / g
     height = fluid.reach(tuple(up)) + fluid.reach(tuple(-up))
     z = x @ up + fluid.reach(tuple(-up))
-    state = Tait(scene.rest_density, scene.wave_speed)
-    sinking = g / scene.wave_speed**2 * (height * z - 0.5 * z * z)
+    sound = scene.least_wave_speed  # at which all begin where it is regional
+    state = Tait(scene.rest_density, sound)
+    sinking = g / sound**2 * (height * z - 0.5 * z * z)
     return x - sinking[:, None] * up, state.density(scene.rest_density * g * (height - z))
 
 

@@ -2,8 +2,10 @@
 
 import pytest
 
+import taichi_rts as rts
+from taichi_rts.stability import chart
 from taichi_rts.stability.cases import CASES
-from taichi_rts.stability.suite import SETTINGS
+from taichi_rts.stability.suite import SETTINGS, Plan
 from taichi_rts.stability.survival import watch
 
 BY_NAME = {case.name: case for case in CASES}
@@ -37,3 +39,28 @@ def test_a_fixed_step_cannot_stop_a_block_at_mach_0_7(start_taichi, quick):
     outcome = run(start_taichi, quick, "wall_impact_0.7", "serna", demanded=1.66)
     assert not outcome.survived
     assert outcome.time < 0.02
+
+
+def test_the_regional_sound_speed_changes_the_scene_and_skips_what_it_cannot_serve():
+    setting, case = BY_STEPPER["regional_c"], BY_NAME["pool_impact_0.5"]
+    assert setting.scene(case).regional_sound == rts.RegionalSound()
+    assert BY_STEPPER["regional"].scene(case) == case.scene
+    plan = Plan([case, BY_NAME["still_pool_continuity"]], [BY_STEPPER["regional"], setting])
+    assert [(one.name, other.name) for one, other in plan.cells] == [
+        ("pool_impact_0.5", "regional"),
+        ("pool_impact_0.5", "regional_c"),
+        ("still_pool_continuity", "regional"),
+    ]
+    assert plan.key(case, setting) != plan.key(case, BY_STEPPER["regional"])
+    (note,) = chart.notes(plan)
+    assert note.startswith("left out: still_pool_continuity with regional_c: sound_speed: ")
+    assert "use density 'summation'" in note
+
+
+@pytest.mark.parametrize("stepper", ["regional_c", "asynchronous_c"])
+def test_a_block_at_20_m_s_on_a_pool_with_the_regional_sound_speed(start_taichi, quick, stepper):
+    setting = BY_STEPPER[stepper]
+    with start_taichi("cpu", "f32", **quick):
+        outcome = watch(setting.scene(BY_NAME["pool_impact_0.5"]), setting.make(setting.default), demanded_density=1.2)
+    assert outcome.reason == ""
+    assert outcome.energy <= 1.005

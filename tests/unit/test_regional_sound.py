@@ -342,3 +342,12 @@ def test_with_one_sound_speed_it_is_the_run_without(start_taichi, quick):
     assert np.abs(one[0] - other[0]).max() < 1e-5 * S
     assert np.abs(one[1] - other[1]).max() < 1e-5
     assert np.abs(one[4] - other[4]).max() < 1e-5 * one[4].max()
+
+
+def test_a_hydrostatic_start_has_the_pressure_of_its_depth(taichi_cpu_f64):
+    scene = tank(rts.Block((0, 0), (1, 0.5)), domain=rts.Box((0, 0), (1, 1)), hydrostatic=True)
+    run = rts.Simulation(scene, rts.Uniform())
+    x, p = run.positions(), run.pressures()
+    inner = (np.abs(x[:, 0] - 0.5) < 0.2) & (x[:, 1] < 0.45)
+    hydrostatic = REST * G * (0.5 - x[inner, 1])
+    assert (p[inner] / hydrostatic).mean() == pytest.approx(1.0, abs=0.03)
