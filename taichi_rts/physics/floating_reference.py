@@ -9,7 +9,6 @@ from taichi_rts.particles import Particles
 from taichi_rts.physics.equation_of_state import Tait, tait
 from taichi_rts.physics.sound_rule import SoundRule
 
-
 SLACK = 2.0
 """How many times its target a sound speed may be before it falls.
 
