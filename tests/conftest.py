@@ -57,3 +57,18 @@ def taichi_vulkan(start_taichi):
         pytest.skip("no Vulkan driver on this machine")
     with start_taichi("vulkan", "f32") as started:
         yield started
+
+
+@pytest.fixture
+def simulate(kernel_cache):
+    """Return a function that builds a Simulation in double precision, and ends the one before.
+
+    It starts Taichi anew: of a second Simulation in one program, the cache does not know the same kernels again.
+    """
+
+    def build(*args, **options):
+        rts.init("cpu", "f64", **QUICK)
+        return rts.Simulation(*args, **options)
+
+    yield build
+    ti.reset()
