@@ -72,3 +72,9 @@ def simulate(kernel_cache):
 
     yield build
     ti.reset()
+
+
+@pytest.fixture
+def unstarted(monkeypatch):
+    """Simulations evaluate no first forces, so that next to nothing is compiled: for what they know before."""
+    monkeypatch.setattr(rts.Simulation, "_start", lambda sim: None)

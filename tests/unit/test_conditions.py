@@ -195,7 +195,7 @@ def test_a_piston_pushes_and_its_work_is_counted(simulate, stepper):
     assert np.abs(sim.momentum_drift()).max() < 0.02 * np.abs(sim.momentum()).max()
 
 
-def test_work_of_walls_needs_a_debug_run(simulate):
+def test_work_of_walls_needs_a_debug_run(simulate, unstarted):
     sim = simulate(scene(moving_walls=[PISTON]), rts.Uniform())
     with pytest.raises(rts.Error, match="debug=True"):
         sim.work()
@@ -248,8 +248,7 @@ def test_only_viscous_blocks_step_short(simulate):
     viscous = 0.125 * 0.05**2 / 1.0
     acoustic = 0.4 * 0.1 / 20.0
     thick = np.arange(32) < 16
-    uniform = simulate(split, rts.Uniform())
-    assert uniform.base_step == pytest.approx(viscous)
+    assert rts.Uniform().timeline(split).tick == pytest.approx(viscous)
     for stepper in (rts.Regional(levels=6, courant=0.4), rts.Asynchronous()):
         sim = simulate(split, stepper)
         sim.advance_to(0.05)
