@@ -1,3 +1,4 @@
+import os
 from contextlib import contextmanager
 
 import pytest
@@ -15,14 +16,23 @@ def quick():
     return QUICK
 
 
-@pytest.fixture(scope="session")
-def start_taichi(tmp_path_factory):
-    cache = str(tmp_path_factory.mktemp("taichi_cache"))  # shared, so that a kernel met before is not compiled again
+@pytest.fixture(scope="session", autouse=True)
+def kernel_cache(tmp_path_factory):
+    """One for the whole run: what one process has compiled, neither xdist's other workers nor subprocesses compile again."""
+    run = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        run = run.parent  # xdist gives each worker a folder of its own
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TI_OFFLINE_CACHE_FILE_PATH", str(run / "taichi_cache"))
+        yield
 
+
+@pytest.fixture(scope="session")
+def start_taichi(kernel_cache):
     @contextmanager
     def start(arch="cpu", precision="f32", **options):
         try:
-            yield rts.init(arch, precision, offline_cache_file_path=cache, **options)
+            yield rts.init(arch, precision, **options)
         finally:
             ti.reset()
 
@@ -47,3 +57,24 @@ def taichi_vulkan(start_taichi):
         pytest.skip("no Vulkan driver on this machine")
     with start_taichi("vulkan", "f32") as started:
         yield started
+
+
+@pytest.fixture
+def simulate(kernel_cache):
+    """Return a function that builds a Simulation in double precision, and ends the one before.
+
+    It starts Taichi anew: of a second Simulation in one program, the cache does not know the same kernels again.
+    """
+
+    def build(*args, **options):
+        rts.init("cpu", "f64", **QUICK)
+        return rts.Simulation(*args, **options)
+
+    yield build
+    ti.reset()
+
+
+@pytest.fixture
+def unstarted(monkeypatch):
+    """Simulations evaluate no first forces, so that next to nothing is compiled: for what they know before."""
+    monkeypatch.setattr(rts.Simulation, "_start", lambda sim: None)

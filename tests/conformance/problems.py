@@ -54,6 +54,9 @@ STEPPERS = {
     "asynchronous_integers": rts.Asynchronous(steps="integers", levels=16, stagger=1),
 }
 
+IN_2D_ONLY = ("uniform_symplectic_euler", "uniform_adaptive", "regional", "asynchronous")
+"""Of each kind others run in three dimensions; the defaults do so in tests/validation/test_still_pool.py."""
+
 
 @dataclass
 class Record:

@@ -132,10 +132,10 @@ def drop(periodic, velocity):
 
 
 @pytest.mark.parametrize("density", ["summation", "continuity"])
-def test_crossing_a_periodic_face_changes_nothing(taichi_cpu_f64, density):
+def test_crossing_a_periodic_face_changes_nothing(simulate, density):
     end, states = 0.125, []
     for velocity in ((0, 0), (4, 4)):
-        sim = rts.Simulation(drop(("x", "y"), velocity).replace(density=density), rts.Uniform())
+        sim = simulate(drop(("x", "y"), velocity).replace(density=density), rts.Uniform())
         sim.advance_to(end)
         states.append((sim.positions(), sim.velocities() - velocity, sim.densities()))
     (x, v, rho), (shifted, v_too, rho_too) = states
@@ -147,10 +147,10 @@ def test_crossing_a_periodic_face_changes_nothing(taichi_cpu_f64, density):
     np.testing.assert_allclose(rho_too, rho, rtol=1e-11)
 
 
-def test_asynchronous_steps_look_back_across_a_periodic_face(taichi_cpu_f64):
+def test_asynchronous_steps_look_back_across_a_periodic_face(simulate):
     stepper, widths = rts.Asynchronous(steps="integers", stagger=1), []
     for velocity in ((0, 0), (1, 0)):  # both slow enough that |v| shortens no step
-        sim = rts.Simulation(drop(("x",), velocity), stepper, debug=True)
+        sim = simulate(drop(("x",), velocity), stepper, debug=True)
         sim.advance_to(0.4)
         x = sim.positions()
         widths.append(np.ptp((x - velocity * np.array([0.4, 0]) + 0.25) % 1.0, axis=0))
@@ -159,10 +159,10 @@ def test_asynchronous_steps_look_back_across_a_periodic_face(taichi_cpu_f64):
 
 
 @each_stepper
-def test_gravity_changes_in_flight(taichi_cpu_f64, stepper):
+def test_gravity_changes_in_flight(simulate, stepper):
     ball = rts.Block((0.4, 0.4), (0.6, 0.6))
     flying = scene(fluids=[ball], gravity_changes=[rts.GravityChange(0.1, (2.0, 4.0))], walls=False)
-    sim = rts.Simulation(flying, stepper)
+    sim = simulate(flying, stepper)
     start, energy = sim.positions(), sim.energy().total
     assert sim.work() == 0
     sim.advance_to(0.3)
@@ -179,12 +179,12 @@ def test_gravity_changes_in_flight(taichi_cpu_f64, stepper):
     [rts.Uniform(courant=0.1), rts.Regional(levels=3, courant=0.05), rts.Asynchronous(courant=0.1, stagger=1)],
     ids=STEPPERS,
 )
-def test_a_piston_pushes_and_its_work_is_counted(taichi_cpu_f64, stepper):
+def test_a_piston_pushes_and_its_work_is_counted(simulate, stepper):
     # without viscosity, so that nothing but the work changes the energy (at courant 0.4 the impacts cost 13 % of it)
     quiet = {"artificial_viscosity": 0.0, "sound_speed": 20.0, "gravity": (0, 0)}
     piston = rts.MovingWall("x-", (0.05, 0.25), (0, 0.2))
     pushed = scene(fluids=[rts.Block((0, 0.3), (0.3, 0.7))], moving_walls=[piston], **quiet)
-    sim = rts.Simulation(pushed, stepper, debug=True)
+    sim = simulate(pushed, stepper, debug=True)
     sim.advance_to(0.3)
     x, v = sim.positions(), sim.velocities()
     assert x[:, 0].min() > 0.2
@@ -195,18 +195,18 @@ def test_a_piston_pushes_and_its_work_is_counted(taichi_cpu_f64, stepper):
     assert np.abs(sim.momentum_drift()).max() < 0.02 * np.abs(sim.momentum()).max()
 
 
-def test_work_of_walls_needs_a_debug_run(taichi_cpu_f64):
-    sim = rts.Simulation(scene(moving_walls=[PISTON]), rts.Uniform())
+def test_work_of_walls_needs_a_debug_run(simulate, unstarted):
+    sim = simulate(scene(moving_walls=[PISTON]), rts.Uniform())
     with pytest.raises(rts.Error, match="debug=True"):
         sim.work()
 
 
 @each_stepper
-def test_fluid_flows_in_layer_by_layer(taichi_cpu_f64, stepper):
+def test_fluid_flows_in_layer_by_layer(simulate, stepper):
     fountain = scene(inflows=[JET], gravity=(0, 0), sound_speed=30.0)
     layer = len(fill_patch(fountain, JET))
     assert layer == 2
-    jet = rts.Simulation(fountain, stepper, debug=True)
+    jet = simulate(fountain, stepper, debug=True)
     pool, start = jet.count, jet.energy().total
     for time in (0.02, 0.06, 0.09):
         jet.advance_to(time)
@@ -222,7 +222,7 @@ def test_fluid_flows_in_layer_by_layer(taichi_cpu_f64, stepper):
     assert (jet.densities()[pool:] > 500).any()
 
 
-def test_viscosity_belongs_to_the_fluid(taichi_cpu_f64):
+def test_viscosity_belongs_to_the_fluid(simulate):
     quiet = {"gravity": (0, 0), "artificial_viscosity": 0.0, "sound_speed": 20.0, "walls": False}
     lower, upper = rts.LinearField(((0, 0), (0, 0)), value=(1, 0)), rts.LinearField(((0, 0), (0, 0)), value=(-1, 0))
 
@@ -231,7 +231,7 @@ def test_viscosity_belongs_to_the_fluid(taichi_cpu_f64):
             rts.Block((0.2, y), (0.8, y + 0.2), velocity=u, kinematic_viscosity=nu)
             for y, u, nu in zip((0.2, 0.4), (lower, upper), nus, strict=True)
         ]
-        sim = rts.Simulation(scene(fluids=blocks, kinematic_viscosity=scene_nu, **quiet), rts.Uniform())
+        sim = simulate(scene(fluids=blocks, kinematic_viscosity=scene_nu, **quiet), rts.Uniform())
         return sim.particles.to_numpy(sim.particles.a)
 
     same = shear(None, None, scene_nu=0.02)
@@ -241,24 +241,23 @@ def test_viscosity_belongs_to_the_fluid(taichi_cpu_f64):
     np.testing.assert_allclose(shear(0.06, 0.02), 1.5 * same, rtol=1e-9, atol=1e-12)  # the harmonic mean 0.03
 
 
-def test_only_viscous_blocks_step_short(taichi_cpu_f64):
+def test_only_viscous_blocks_step_short(simulate):
     still = {"gravity": (0, 0), "sound_speed": 20.0, "walls": False}
     blocks = [rts.Block((0.1, 0.1), (0.3, 0.3), kinematic_viscosity=1.0), rts.Block((0.7, 0.7), (0.9, 0.9))]
     split = scene(fluids=blocks, **still)
     viscous = 0.125 * 0.05**2 / 1.0
     acoustic = 0.4 * 0.1 / 20.0
     thick = np.arange(32) < 16
-    uniform = rts.Simulation(split, rts.Uniform())
-    assert uniform.base_step == pytest.approx(viscous)
+    assert rts.Uniform().timeline(split).tick == pytest.approx(viscous)
     for stepper in (rts.Regional(levels=6, courant=0.4), rts.Asynchronous()):
-        sim = rts.Simulation(split, stepper)
+        sim = simulate(split, stepper)
         sim.advance_to(0.05)
         steps = sim.steps()
         assert steps[thick].max() <= viscous * (1 + 1e-6)
         assert steps[~thick].min() >= min(6 * viscous, acoustic) * (1 - 1e-6)
 
 
-def test_walls_do_not_let_fluid_slip(taichi_cpu_f64):
+def test_walls_do_not_let_fluid_slip(simulate):
     """A linear profile over a lattice at rest on the wall feels no viscous force (Morris, Fox & Zhu 1997)."""
     quiet = {"gravity": (0, 0), "artificial_viscosity": 0.0, "sound_speed": 20.0}
     for density, ratio, kernel, most in (
@@ -268,9 +267,9 @@ def test_walls_do_not_let_fluid_slip(taichi_cpu_f64):
         flow = rts.LinearField(((0, 1), (0, 0)))
         block = rts.Block((0, 0), (1, 0.5), velocity=flow)
         medium = {"density": density, "support_ratio": ratio, "kernel": kernel, "kinematic_viscosity": 0.01}
-        sim = rts.Simulation(scene(fluids=[block], **medium, **quiet), rts.Uniform())
+        sim = simulate(scene(fluids=[block], **medium, **quiet), rts.Uniform())
         x, a = sim.positions(), sim.particles.to_numpy(sim.particles.a)
         first = (x[:, 1] < 0.05) & (abs(x[:, 0] - 0.5) < 0.3)
-        slip = rts.Simulation(scene(fluids=[block], walls=False, **medium, **quiet), rts.Uniform())
+        slip = simulate(scene(fluids=[block], walls=False, **medium, **quiet), rts.Uniform())
         without = slip.particles.to_numpy(slip.particles.a)
         assert np.abs(a[first, 0]).max() < most * np.abs(without[first, 0]).max()

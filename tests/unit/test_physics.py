@@ -131,7 +131,7 @@ def test_body_force_is_added_to_gravity_and_is_the_slope_of_the_potential_energy
         assert force == pytest.approx(sim.medium.mass * wanted[:, d].sum(), rel=1e-7)
 
 
-def test_without_a_body_force_there_is_no_code_for_it(taichi_cpu_f64):
+def test_without_a_body_force_there_is_no_code_for_it(taichi_cpu_f64, unstarted):
     assert not rts.Simulation(make_scene(), rts.Uniform()).motion.momentum.gravity.has_body_force
 
 

@@ -106,9 +106,10 @@ def test_momentum_is_accounted_for_by_gravity_and_walls(taichi_cpu_f64, stepper,
     assert np.abs(sim.momentum_drift()).max() < share * weight_times_time
 
 
-def test_the_momentum_budget_needs_a_debug_run(taichi_cpu_f64):
+def test_the_momentum_budget_needs_a_debug_run(taichi_cpu_f64, unstarted):
+    sim = rts.Simulation(SMALL)
     with pytest.raises(rts.Error, match="debug=True"):
-        rts.Simulation(SMALL).momentum_drift()
+        sim.momentum_drift()
 
 
 def test_debug_runs_stop_at_what_must_not_happen(taichi_cpu_f64):

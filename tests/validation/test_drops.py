@@ -87,12 +87,12 @@ def test_the_papers_setting_steps_regions_apart(oscillating):
     )  # the default has both drops on its longest step throughout
 
 
-def test_order_of_convergence(start_taichi):
+def test_order_of_convergence(simulate):
     """Against the same particles at a step 16 times the smallest tested smaller (docs/asynchronous.md has the full tables)."""
     scene = rts.load_scene("oscillating_drop", spacing=0.125)
 
     def velocities(stepper):
-        sim = rts.Simulation(scene, stepper)
+        sim = simulate(scene, stepper)
         sim.advance_to(0.2)
         return sim.velocities()
 
@@ -107,22 +107,20 @@ def test_order_of_convergence(start_taichi):
             courant=c, lambda_f=c / 8, steps="integers", stagger=1, inactive_density="stale"
         ),
     }
-    with start_taichi("cpu", "f64"):
-        reference = velocities(rts.Uniform(courant=0.1 / 16))
-        orders = {name: float(np.log2(np.divide(*errors(make))) / 2) for name, make in makers.items()}
+    reference = velocities(rts.Uniform(courant=0.1 / 16))
+    orders = {name: float(np.log2(np.divide(*errors(make))) / 2) for name, make in makers.items()}
     assert orders["uniform"] > 1.7  # 2.0 measured
     assert orders["asynchronous"] > 1.7
     assert 0.8 < orders["regional"] < 1.7
     assert 0.8 < orders["stale"] < 1.5
 
 
-def test_order_of_convergence_with_an_integrated_density(start_taichi):
+def test_order_of_convergence_with_an_integrated_density(simulate):
     scene = rts.load_scene("oscillating_drop", spacing=0.125, density="continuity")
-    with start_taichi("cpu", "f64"):
-        found = []
-        for courant in (0.4, 0.1, 0.1 / 16):
-            sim = rts.Simulation(scene, rts.Uniform(courant=courant))
-            sim.advance_to(0.2)
-            found.append(sim.velocities())
+    found = []
+    for courant in (0.4, 0.1, 0.1 / 16):
+        sim = simulate(scene, rts.Uniform(courant=courant))
+        sim.advance_to(0.2)
+        found.append(sim.velocities())
     coarse, fine = (np.linalg.norm(v - found[-1]) for v in found[:2])
     assert np.log2(coarse / fine) / 2 > 1.7
