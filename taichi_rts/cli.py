@@ -55,8 +55,8 @@ class Run:
     """Regional: Serna's corrector. Without it the method blows up."""
     inactive_density: Literal["stale", "extrapolated"] | None = None
     """Regional, asynchronous: density of particles that are not due."""
-    steps: Literal["powers_of_two", "integers"] | None = None
-    """Regional, asynchronous: lengths that steps may have, in base steps; powers_of_two keeps blocks in step with each other."""
+    steps: Literal["powers_of_two", "half_octaves", "integers"] | None = None
+    """Regional, asynchronous: lengths that steps may have, in base steps; half_octaves only regional (1, 2, 3, 4, 6, 8, 12 ...)."""
     limiter: bool | None = None
     """Regional, asynchronous: bound a block's step by its neighbours' and by its last, and wake neighbours."""
     stagger: int | None = None
