@@ -56,7 +56,7 @@ class Run:
     inactive_density: Literal["stale", "extrapolated"] | None = None
     """Regional, asynchronous: density of particles that are not due."""
     steps: Literal["powers_of_two", "half_octaves", "integers"] | None = None
-    """Regional, asynchronous: lengths that steps may have, in base steps; half_octaves only regional (1, 2, 3, 4, 6, 8, 12 ...)."""
+    """Regional, asynchronous: lengths that steps may have, in base steps; half_octaves (1, 2, 3, 4, 6 ...) only regional."""
     limiter: bool | None = None
     """Regional, asynchronous: bound a block's step by its neighbours' and by its last, and wake neighbours."""
     stagger: int | None = None
