@@ -144,13 +144,9 @@ class Scene:
     @property
     def regional_sound(self) -> RegionalSound | None:
         """What governs the regional sound speed, if there is one."""
-        return (
-            RegionalSound()
-            if self.sound_speed == "regional"
-            else self.sound_speed
-            if isinstance(self.sound_speed, RegionalSound)
-            else None
-        )
+        if self.sound_speed == "regional":
+            return RegionalSound()
+        return self.sound_speed if isinstance(self.sound_speed, RegionalSound) else None
 
     @property
     def wave_speed(self) -> float:

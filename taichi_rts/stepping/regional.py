@@ -237,10 +237,7 @@ class RegionalSchedule(Schedule):
         """Algorithm 1, lines 5-16, and the list of due particles."""
         self.determine_regions(now, tick, self.reach)
         self.apply_minimum_region()
-        if self.aligned:
-            self.update_aligned(now, now - self.now)
-        else:
-            self.update_validity(now)
+        self.update_validity(now, now - self.now)
         self.now = now
         self.scan.run()
         self.compact_due()
@@ -318,30 +315,8 @@ class RegionalSchedule(Schedule):
             self.beside.limit(self.raw_level, self.block_level, factor, jump)
 
     @ti.kernel
-    def update_validity(self, now: ti.i32):
-        """Lines 10-16: due are particles whose validity has run out or whose block has another step; they take its step."""
-        for block in range(self.blocks):
-            first, end = self.grid.first(block), self.grid.first(block + 1)
-            level = self.block_level[block]
-            count = 0
-            for k in range(first, end):
-                i = self.grid.order[k]
-                validity = self.particles.level[i] - (now - self.particles.updated[i])
-                flag = 0
-                if validity <= 0 or self.particles.level[i] != level:
-                    flag = 1
-                    self.particles.level[i] = level
-                self.flag[k] = flag
-                count += flag
-            self.count(block, level, end - first, count, 1)
-
-    @ti.kernel
-    def update_aligned(self, now: ti.i32, passed: ti.i32):
-        """The same where steps end at multiples of themselves: due are the blocks whose level divides `now`.
-
-        And at once the particles whose step has become shorter. Whose step has become longer goes on to its end. `passed` ticks
-        have gone by since the last call.
-        """
+    def update_validity(self, now: ti.i32, passed: ti.i32):
+        """Lines 10-16: find who is due; all take the step of their block. `passed` ticks have gone by since the last call."""
         self.until_next[None] = self.levels
         for block in range(self.blocks):
             first, end = self.grid.first(block), self.grid.first(block + 1)
@@ -349,21 +324,32 @@ class RegionalSchedule(Schedule):
             count = 0
             for k in range(first, end):
                 i = self.grid.order[k]
-                flag = ti.cast(now % level == 0 or level < self.particles.level[i], ti.i32)
-                self.particles.level[i] = level
+                flag = ti.cast(self.is_due(i, level, now), ti.i32)
+                if self.particles.level[i] != level:
+                    self.particles.level[i] = level
                 self.flag[k] = flag
                 count += flag
+            self.block_due[block] = count
             if first < end:
-                ti.atomic_min(self.until_next[None], level - now % level)
-            self.count(block, level, end - first, count, passed)
+                if ti.static(self.aligned):
+                    ti.atomic_min(self.until_next[None], level - now % level)
+                self.occupancy[level] += (end - first) * passed
+                self.updates[level] += count
 
     @ti.func
-    def count(self, block, level, particles, due, passed):
-        """Note how many of a block's particles are due, and for the statistics how many have which level."""
-        self.block_due[block] = due
-        if particles > 0:
-            self.occupancy[level] += particles * passed
-            self.updates[level] += due
+    def is_due(self, i, level, now):
+        """Whether particle `i` of a block with `level` is due: its validity has run out, or its block has another step.
+
+        Where steps end at multiples of themselves: `level` divides `now`, or the step has become shorter. Whose step has become
+        longer then goes on to its end.
+        """
+        own = self.particles.level[i]
+        due = False
+        if ti.static(self.aligned):
+            due = now % level == 0 or level < own
+        else:
+            due = own - (now - self.particles.updated[i]) <= 0 or own != level
+        return due
 
     @ti.kernel
     def compact_due(self):
