@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from tables import head, row
 
 import taichi_rts as rts
 
@@ -26,17 +27,6 @@ STEPPERS = {
     "asynchronous, 0.8 in 16 levels": rts.Asynchronous(courant=0.8, levels=16),
 }
 SECTION_THREADS = "TAICHI_RTS_THREADS"
-
-
-def row(*cells):
-    """Print one row of a table."""
-    print("| " + " | ".join(str(cell) for cell in cells) + " |", flush=True)
-
-
-def head(*cells):
-    """Print the head of a table."""
-    row(*cells)
-    row(*["---"] * len(cells))
 
 
 def checks():

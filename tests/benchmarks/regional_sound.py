@@ -10,21 +10,13 @@ from typing import Any
 
 import numpy as np
 import tyro
+from tables import head, row
 
 import taichi_rts as rts
+from taichi_rts.extremes import DENSE
 
 SCENES = "projectile,water_jet,dam_break_drop,double_dam_break,martin_moyce"
 SAMPLES = 60
-
-
-def head(*cells):
-    """Print the head of a table."""
-    print("\n| " + " | ".join(cells) + " |\n" + "|---" * len(cells) + "|", flush=True)
-
-
-def row(*cells):
-    """Print a row of a table."""
-    print("| " + " | ".join(map(str, cells)) + " |", flush=True)
 
 
 @dataclasses.dataclass
@@ -54,7 +46,7 @@ def run(scene, stepper, samples=SAMPLES):
         seen.kinetic.append(sim.energy().kinetic)
         seen.mach.append(float((speed / sim.sound_speeds()).max()))
         seen.density.append(float(rho.max()) / scene.rest_density)
-        seen.dense.append(float((rho > 1.03 * scene.rest_density).mean()))
+        seen.dense.append(float((rho > DENSE * scene.rest_density).mean()))
         seen.speed = max(seen.speed, float(speed.max()))
     statistics = sim.statistics
     seen.count, seen.updates = sim.count, statistics["particle_updates"]
@@ -72,6 +64,7 @@ def speed(names: list[str], particles: str, courants: list[float], steppers: str
     for name in names:
         scene = rts.load_scene(name, particles=particles)
         regional = scene.replace(sound_speed="regional")
+        print()
         head("run", "λ", "updates [M]", "saved", "wall [s]", "faster", "Δy", "Δ kinetic", "v_max", "limited")
         for courant in courants:
             base = None
@@ -101,6 +94,7 @@ def speed(names: list[str], particles: str, courants: list[float], steppers: str
 
 def extremes(names: list[str], particles: str, courants: list[float], steppers: str) -> None:
     """Largest Mach numbers and densities over the run."""
+    print()
     head(
         "scene",
         "run",
@@ -145,6 +139,7 @@ def rule(names: list[str], particles: str, courants: list[float], steppers: str)
     """What each part of the rule and of the levels is worth."""
     for name in names:
         scene = rts.load_scene(name, particles=particles)
+        print()
         head("variant", "updates saved", "faster", "Δy", "Δ kinetic", "largest density", "limited")
         base = run(scene, rts.Uniform(courants[0]))
         exact = run(scene, rts.Uniform(0.1))
