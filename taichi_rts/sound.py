@@ -32,7 +32,7 @@ class RegionalSound:
     mach: Positive = 0.1
     floor: Positive | None = None
     cap: Positive | None = None
-    memory: Positive = 25.0
+    memory: Positive = 40.0
 
     @model_validator(mode="after")
     def _check(self) -> RegionalSound:

@@ -9,14 +9,6 @@ from taichi_rts.particles import Particles
 from taichi_rts.physics.equation_of_state import Tait, tait
 from taichi_rts.physics.sound_rule import SoundRule
 
-SLACK = 2.0
-"""How many times its target a sound speed may be before it falls.
-
-Without slack it follows the pressure of every slow wave, and the reference density follows the sound speed a quarter of a period
-late: that feeds the wave, and a ringing pool never comes to rest (tests/conformance/test_still_regional_pool.py: kinetic energy
-after 2 s 15 times that with one sound speed, with a slack of 1.4 7.5 times, of 1.7 6 times, of 2 0.8 times).
-"""
-
 
 @ti.data_oriented
 class FloatingReference(Tait):
@@ -24,13 +16,13 @@ class FloatingReference(Tait):
 
     Why it floats: with p = p(rho) alone another c_i would make p_i jump, and with it every force nearby. So when c_i changes,
     rho_ref,i moves to where the pressure stays: rho_ref = rho (1 + 7 p/(rho_0 c_new^2))^(-1/7). Afterwards it relaxes to
-    rho_0, by c dt/(memory r) of the way in a step dt: about 2 % a step, so that no particle keeps a volume that is not its
+    rho_0, by c dt/(memory r) of the way in a step dt: about 1 % a step, so that no particle keeps a volume that is not its
     own. Between two evaluations pressure is a function of positions alone, which is why steps may be as long as with Tait's
     (an evolved pressure needs shorter ones). Where the pressure is cut off the reference does not move: a particle of
     the free surface, whose sum is not full, must not press at half the density.
 
-    c_i follows its block's target (`SoundRule`): up at once, because what comes fast must meet stiff fluid, and, while it is
-    more than `SLACK` times the target, down by 1/c_new = 1/c + dt/(memory r).
+    c_i follows its block (`SoundRule`): up to the target at once, because what comes fast must meet stiff fluid, and, while it
+    is above the ceiling, down by 1/c_new = 1/c + dt/(memory r).
     """
 
     def __init__(self, tait: Tait, particles: Particles, rule: SoundRule) -> None:
@@ -58,8 +50,8 @@ class FloatingReference(Tait):
             self.particles.sound_work[i] -= self.energy_of(i, rho)
         before = self.particles.sound[i]
         fallen = before / (1.0 + before * elapsed * self.rule.forgetting)
-        target = self.rule.target[block]
-        self.particles.sound[i] = ti.max(target, ti.min(before, ti.max(fallen, SLACK * target)))
+        lowered = ti.min(before, ti.max(fallen, self.rule.ceiling[block]))
+        self.particles.sound[i] = ti.max(self.rule.target[block], lowered)
         if pressure > 0.0:
             self.particles.reference[i] = rho * ti.pow(1.0 + pressure / self.stiffness_of(i), -1.0 / 7.0)
         share = ti.min(1.0, self.particles.sound[i] * elapsed * self.rule.forgetting)

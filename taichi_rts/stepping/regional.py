@@ -250,10 +250,10 @@ class RegionalSchedule(Schedule):
             first, end = self.grid.first(block), self.grid.first(block + 1)
             level = BlockLimiter.EMPTY
             if first < end:
-                speed2, acceleration2, viscosity, density = self.maxima.of(block, now, tick)
-                if ti.static(self.by_sound):
-                    level = self.region_by_sound(tick, reach, acceleration2, viscosity, self.sound.limit[block])
+                if ti.static(self.by_sound):  # whose rule has reduced the block already
+                    level = self.region_by_sound(block, tick, reach)
                 else:
+                    speed2, acceleration2, viscosity, density = self.maxima.of(block, now, tick)
                     level = self.region(tick, reach, speed2, acceleration2, viscosity, density)
                 if ti.static(self.limits):
                     before = self.block_level[block]  # of the last step; who was empty has nothing to grow from
@@ -294,8 +294,10 @@ class RegionalSchedule(Schedule):
         return level
 
     @ti.func
-    def region_by_sound(self, base_step, reach, acceleration2, viscosity, sound):
+    def region_by_sound(self, block, base_step, reach):
         """The largest level for which Eq. 1 holds with the block's own sound speed [m/s], Eq. 2 and the viscous limit."""
+        acceleration2, viscosity = self.sound.acceleration2[block], self.sound.viscosity[block]
+        sound = self.sound.limit[block]
         level = 1
         for n in ti.static(range(2, self.levels + 1)):
             if ti.static(n in self.lengths):

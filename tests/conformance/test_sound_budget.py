@@ -23,11 +23,11 @@ def impact():
 
 
 def test_energy_less_what_changes_of_sound_speed_do_is_kept(impact):
-    """Measured: -3.8 % with that work left out, -14.4 % with it."""
+    """Measured: -2.5 % with that work left out, -27.1 % with it."""
     sim, start = impact
     change, work = sim.energy().total / start - 1.0, sim.sound_work() / start
     assert -0.05 < change - work < 0.0
-    assert -0.15 < work < -0.05  # sound is damped, never fed
+    assert -0.3 < work < -0.1  # sound is damped, never fed
 
 
 def test_momentum_is_kept_to_rounding(impact):
@@ -39,8 +39,8 @@ def test_calm_water_is_soft_again_and_all_is_within_the_rule(impact):
     sim, _ = impact
     sounds = sim.sound_speeds()
     one = 10.0 * sim.scene.estimate_max_speed()  # 109 m/s
-    assert sounds.min() < 0.4 * one  # measured: 36.3 m/s, 2.4 times the smallest there may be
-    assert sounds.mean() < 0.8 * one
+    assert sounds.min() < 0.25 * one  # measured: 20.7 m/s, 1.4 times the smallest there may be
+    assert sounds.mean() < 0.6 * one
     assert (((sim.velocities() ** 2).sum(axis=1) ** 0.5) < 0.12 * sounds).all()
 
 

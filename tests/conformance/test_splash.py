@@ -3,11 +3,11 @@
 What is asserted, and what was measured in f64 (largest at any sample, time until 0.1 s):
 
                                      one c   adaptive   regional   asynchronous
-    local Mach number                0.142   0.100      0.101      0.100
+    local Mach number                0.142   0.100      0.100      0.100
     energy over the start's          0.997   0.997      0.997      0.997
-    momentum nobody accounts for     6e-15   4e-15      0.0022     0.0028      of the block's
-    centre of mass, over the depth   -       0.0064     0.0069     0.0046      beside that with one c
-    updates                          348608  535808     153652     170549
+    momentum nobody accounts for     5e-15   3e-15      0.0020     0.0028      of the block's
+    centre of mass, over the depth   -       0.0065     0.0065     0.0076      beside that with one c
+    updates                          348608  549952     192966     209961
 """
 
 import numpy as np
@@ -72,9 +72,8 @@ def run(start_taichi, quick, stepper):
 def test_nobody_is_lost_and_nothing_runs_away(run):
     assert run.finite
     assert run.lost == {""}
-    assert run.count == run.statistics["particle_updates"] / (
-        run.statistics["base_steps"] * run.statistics["active_fraction"]
-    )
+    counted = run.statistics["particle_updates"] / (run.statistics["base_steps"] * run.statistics["active_fraction"])
+    assert counted == pytest.approx(run.count)
     assert run.statistics["runaways"] == 0
     assert run.statistics["stopped_by_domain"] == 0
 
@@ -108,6 +107,6 @@ def test_no_step_is_longer_than_its_own_sound_allows(run, stepper):
 
 def test_most_of_the_pool_is_spared_the_short_steps(run, stepper, one_sound_speed):
     saved = one_sound_speed.statistics["particle_updates"] / run.statistics["particle_updates"]
-    # One step for all follows the splash. Measured: 0.48, 1.58, 1.48; without the slack of two (`floating_reference.SLACK`)
+    # One step for all follows the splash. Measured: 0.63, 1.81, 1.66; without the slack of two (`sound_rule.SLACK`)
     # 0.65, 2.27, 2.04.
-    assert saved >= {"adaptive": 0.45, "regional": 1.5, "asynchronous": 1.4}[stepper]
+    assert saved >= {"adaptive": 0.6, "regional": 1.7, "asynchronous": 1.55}[stepper]

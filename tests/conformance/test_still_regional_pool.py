@@ -1,12 +1,12 @@
 """A pool 1 m deep, 600 particles, that starts uncompressed and rings, with the regional sound speed (cap 100 m/s, `Regional`).
 
 Mean kinetic energy [J] over quarters of a second (f32), measured with `Uniform` and the scene's one sound speed of 44.3 m/s,
-and with regional sound speeds that fall as soon as they may (slack 1), or only from `floating_reference.SLACK` times the target:
+with regional sound speeds that fall as soon as they may (slack 1, memory 25), and with the default slack and memory
+(`physics.sound_rule.SLACK`, `RegionalSound.memory`):
 
     one c        7.7   4.9   3.6   2.7   2.3   2.1   1.7   1.5
     slack 1     45.9  21.2  22.0  25.8  21.5  28.8  22.7  22.1    it never comes to rest
-    slack 1.7   37.8  10.0   5.7   8.0  10.1   7.8   9.6   8.9
-    slack 2     36.3   6.1   3.1   2.6   2.2   1.8   1.4   1.2
+    default     29.5   6.6   2.9   2.3   1.8   1.6   1.3   1.1
 """
 
 import numpy as np
