@@ -8,7 +8,7 @@ import taichi_rts as rts
 
 FALL_VELOCITY = (0.1, -0.5)
 THROW = (1.0, 0.5)
-STRAIN = rts.LinearField(((-4.0, 0.0), (0.0, 4.0)), value=THROW, origin=(0.4, 0.5))
+STRAIN = rts.LinearField(((4.0, 0.0), (0.0, -4.0)), value=THROW, origin=(0.4, 0.5))
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ PROBLEMS = {
         ),
         0.08,
     ),
-    "drop_in_flight": Problem(tank_2d(rts.Sphere((0.4, 0.5), 0.25, velocity=STRAIN)), 0.12),
+    "drop_in_flight": Problem(tank_2d(rts.Block((0.2, 0.1), (0.6, 0.9), velocity=STRAIN)), 0.12),
 }
 
 STEPPERS = {

@@ -37,13 +37,16 @@ def fronts(columns):
 
 @pytest.mark.parametrize("stepper", ["uniform", "regional", "asynchronous"])
 def test_front_follows_the_experiment(fronts, stepper):
-    assert np.abs(fronts[stepper] / FRONTS - 1).mean() <= 0.10
+    off = fronts[stepper] / FRONTS - 1
+    assert np.abs(off).mean() <= 0.07  # measured 0.059
+    assert -0.075 < off.mean() < -0.038  # measured -0.057; gravity times 1.1: -0.016, over 1.1: -0.095
 
 
 @pytest.mark.parametrize("stepper", ["uniform", "regional", "asynchronous"])
 def test_column_falls_as_in_the_experiment(columns, stepper):
     off = columns[stepper][1] - HEIGHT[:, 1]
-    assert 0.0 < off.mean() < 0.1  # SPH columns stand a little higher than the experiment's
+    # SPH columns stand a little higher than the experiment's. Measured 0.070; gravity times 1.1: 0.054, over 1.1: 0.083
+    assert 0.06 < off.mean() < 0.08
 
 
 @pytest.mark.parametrize("stepper", ["regional", "asynchronous"])
