@@ -152,9 +152,14 @@ def pass_facts(statistics: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
 
 
-def print_folder(folder: Path, frames: int) -> None:
+def print_folder(folder: Path, frames: int, files: Mapping[str, Any]) -> None:
     """Say where the results are."""
-    console.print(f"{frames} frames in {folder / 'frames'}, facts in {folder / 'run.json'}", soft_wrap=True)
+    pictures = f"{frames} frames in {folder / 'frames'}, " if "frames" in files else ""
+    exports = {path: None for path in files.values() if isinstance(path, str) and "/NNNNNN" in path}
+    exports.pop("frames/NNNNNN.png", None)
+    particles = f"files of {frames} frames in {', '.join(str(folder / path) for path in exports)}, " if exports else ""
+    series = f"time series in {folder / files['series'][0]}, "
+    console.print(f"{pictures}{particles}{series}facts in {folder / 'run.json'}", soft_wrap=True)
 
 
 def print_scenes(scenes: list[Scene]) -> None:

@@ -19,6 +19,7 @@ from pydantic.dataclasses import dataclass
 from taichi_rts.conditions import AXES, Axis, GravityChange, Inflow, MovingWall
 from taichi_rts.errors import SceneError
 from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
+from taichi_rts.probes import Gauge, Probe
 from taichi_rts.scene_checks import contradictions
 from taichi_rts.shapes import Block, Box, Fluid, Sphere, top_speed
 from taichi_rts.sound import FLOOR, RegionalSound, SoundSpeed
@@ -73,6 +74,8 @@ class Scene:
         periodic: axes ("x", "y", "z") along which the domain repeats itself; they have no walls.
         moving_walls: faces of the domain that move.
         inflows: patches of the domain's faces through which fluid enters.
+        probes: points where a run's time series has the pressure.
+        gauges: lines along gravity on which it has the water's height.
         end_time: how long the scene is worth watching [s].
         view: where pictures are taken from.
 
@@ -98,6 +101,8 @@ class Scene:
     periodic: tuple[Axis, ...] = ()
     moving_walls: tuple[MovingWall, ...] = ()
     inflows: tuple[Inflow, ...] = ()
+    probes: tuple[Probe, ...] = ()
+    gauges: tuple[Gauge, ...] = ()
     end_time: Positive = 1.0
     view: View = Field(default_factory=View)
     name: str = "scene"
@@ -261,6 +266,8 @@ _PARTS = (
     GravityChange,
     MovingWall,
     Inflow,
+    Probe,
+    Gauge,
     View,
     RegionalSound,
 )

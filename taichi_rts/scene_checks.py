@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from taichi_rts.conditions import AXES, face_axis, face_position
+from taichi_rts.probes import names
 from taichi_rts.shapes import Block, Sphere, separation
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ def contradictions(scene: Scene) -> list[str]:
     if scene.gravity is not None and len(scene.gravity) != dim:
         faults.append(f"gravity {scene.gravity} has {len(scene.gravity)} components; the domain has {dim}")
     faults += _sound_faults(scene) + _body_force_faults(scene) + _condition_faults(scene)
+    faults += _place_faults(scene, "probes") + _place_faults(scene, "gauges")
     for k, fluid in enumerate(scene.fluids):
         if len(fluid.lower) != dim:
             faults.append(f"fluids.{k}: has {len(fluid.lower)} components; the domain has {dim}")
@@ -129,6 +131,22 @@ def _condition_faults(scene: Scene) -> list[str]:
             faults.append(
                 f"gravity_changes.{k}: gravity has {len(change.gravity)} components; the domain has {scene.dim}"
             )
+    return faults
+
+
+def _place_faults(scene: Scene, kind: str) -> list[str]:
+    """Find what is wrong with the scene's `kind`, probes or gauges."""
+    faults = []
+    places: Any = getattr(scene, kind)
+    for k, place in enumerate(places):
+        x, low, high = place.position, scene.domain.lower, scene.domain.upper
+        if len(x) != scene.dim:
+            faults.append(f"{kind}.{k}: has {len(x)} components; the domain has {scene.dim}")
+        elif not all(a - _slack(scene) <= b <= c + _slack(scene) for a, b, c in zip(low, x, high, strict=True)):
+            faults.append(f"{kind}.{k}: {x} lies outside the domain from {low} to {high}; move it")
+    found = names(places)
+    if twice := sorted({name for name in found if found.count(name) > 1}):
+        faults.append(f"{kind}: two of them have the name {twice[0]!r}; rename one")
     return faults
 
 

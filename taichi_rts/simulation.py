@@ -263,6 +263,10 @@ class Simulation:
         """Steps [s], (N,): level times base step (`Uniform(adaptive=True)`: at most). In order of particle id."""
         return self.particles.to_numpy(self.particles.level) * self.base_step
 
+    def cell_times(self) -> np.ndarray:
+        """Time [s] of each particle's last force evaluation, (N,), by particle id: asynchronous cells run ahead of `time`."""
+        return self.particles.to_numpy(self.particles.updated) * self.timeline.tick
+
     def leads(self) -> np.ndarray:
         """How far [s] the end of each particle's step lies ahead of the earliest end, (N,). In order of particle id."""
         p = self.particles
