@@ -166,7 +166,7 @@ def print_scenes(scenes: list[Scene]) -> None:
     """Print a table of scenes."""
     table = Table("name", "dim", "particles", "end [s]", "what it is")
     for scene in scenes:
-        count = sum(fluid.volume for fluid in scene.fluids) / scene.spacing**scene.dim
+        count = scene.volume / scene.spacing**scene.dim
         table.add_row(scene.name, str(scene.dim), f"{count:,.0f}", f"{scene.end_time:g}", scene.description)
     console.print(table)
 

@@ -50,6 +50,14 @@ def capture(sim: Simulation, attributes: Sequence[str] = DEFAULT_ATTRIBUTES) -> 
     return ParticleFrame(state[0], found | reals, sim.time, sim.scene.spacing)
 
 
+def write_particles(path: str | Path, frame: ParticleFrame) -> None:
+    """Write `frame` to a vtu, ply, npz, bgeo or vtkhdf file, by its suffix; raises `OutputError`."""
+    path = Path(path)
+    each = require_format(path.suffix[1:].lower(), frame.dim)
+    assert each.write is not None  # for mypy
+    write_bytes(path, each.write(frame))
+
+
 class Exporter:
     """Writes the particles of a simulation each time it is called, to FOLDER/particles/000000.vtu and so on.
 

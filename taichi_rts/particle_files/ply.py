@@ -5,6 +5,8 @@ G. Turk, "The PLY Polygon File Format" (1994). Reals are single precision, the o
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from taichi_rts.particle_files.frame import ParticleFrame, from_columns
@@ -62,9 +64,9 @@ def pack(columns: dict[str, np.ndarray], kinds: dict[str, str]) -> bytes:
 
 def read_ply(data: bytes) -> ParticleFrame:
     """Read the vertices of a PLY file, binary or text; raises `ValueError` if it is none."""
-    head, mark, body = data.partition(b"end_header\n")
-    lines = [line.split() for line in head.decode("ascii", "replace").replace("\r", "").splitlines()]
-    if not mark or lines[:1] != [["ply"]]:
+    head, body = (*re.split(rb"end_header\r?\n", data, maxsplit=1), None)[:2]
+    lines = [line.split() for line in head.decode("ascii", "replace").splitlines()] if head else []
+    if body is None or lines[:1] != [["ply"]]:
         raise ValueError("it does not begin as a PLY file does")
     kinds: list[tuple[str, str]] = []
     count, element, order, time = 0, "", "", 0.0

@@ -39,10 +39,12 @@ def read_npz(data: bytes) -> ParticleFrame:
 def read_csv(data: bytes) -> ParticleFrame:
     """Read a table with a row of names first (x, y, z, vx, vy, vz, density ...); raises `ValueError` if it is none."""
     text = data.decode("utf-8-sig")
-    head = text.partition("\n")[0].strip()
+    head, _, rows = (part.strip() for part in text.partition("\n"))
+    if not rows:
+        raise ValueError("it has no rows")
     separator = next((mark for mark in ",;\t" if mark in head), None)
     names = [name.strip().strip('"').lower() for name in head.split(separator)]
-    table = np.loadtxt(io.StringIO(text), delimiter=separator, skiprows=1, ndmin=2)
+    table = np.loadtxt(io.StringIO(rows), delimiter=separator, ndmin=2)
     if table.shape[1] != len(names):
         raise ValueError(f"it has {len(names)} names ({', '.join(names)}) for {table.shape[1]} columns")
     return from_columns(dict(zip(names, table.T, strict=True)))
