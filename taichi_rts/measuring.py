@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from taichi_rts.conditions import AXES, face_axis, face_position
+from taichi_rts.conditions import AXES, face_axis
+from taichi_rts.neighbours import near_pairs
 from taichi_rts.physics.medium import Medium
-from taichi_rts.sampling import calibrate_walls, plane_sum
+from taichi_rts.sampling import line_walls
 from taichi_rts.scene import Scene
 
 FRONT_RANK = 5
@@ -18,7 +19,7 @@ SURFACE = 0.5
 """Share of the full lattice's sum of kernels at the water's surface: on a plane surface half of the support is full."""
 PITCH = 1.0 / 16.0
 """Distance of the points on a gauge's line, over the support radius."""
-SLOPES = 400  # entries of the table of a wall's push over the distance
+SLOPES = 1000  # entries of the table of dW/dd over the distance
 
 
 def periods(scene: Scene) -> np.ndarray:
@@ -94,46 +95,70 @@ def water_height(scene: Scene, medium: Medium, x: np.ndarray, position: np.ndarr
 
 
 class FaceForces:
-    """Forces of the water's pressure on the faces of the domain's box that have a wall and no inflow.
+    """Forces of the water's pressure on the faces of the domain's box: the reaction to what the walls do to the fluid.
 
-    F = sum_i m rho_0 V (p_i/rho_i^2 + p_w/rho_i^2) |S'(d_i)|: the reaction to the pressure that the walls of `Walls` exert, with
-    S(d) the sum of W over an infinite plane of wall particles at distance d. p_w is what `MirroredPressure` adds where density is
-    integrated, else 0. Friction on the walls is not in it.
+    F_b = -sum_i m rho_0 V_b (c_i + c_ib) grad W_ib with c_i = p_i/rho_i^2 (Akinci et al. 2012, Eq. 9) and c_ib what
+    `MirroredPressure` adds where density is integrated, else 0. A face has the component along its normal of all wall particles
+    behind it, so that those behind an edge count for both faces. Friction on the walls is not in it.
     """
 
     def __init__(self, scene: Scene, medium: Medium) -> None:
         self.scene = scene
         self.medium = medium
-        closed = {inflow.face for inflow in scene.inflows}
-        faces = [AXES[d] + side for d in range(scene.dim) if not scene.is_periodic[d] for side in "-+"]
-        self.faces = [face for face in faces if face not in closed] if scene.walls else []
-        """Names of the faces, "x-", "x+" and so on."""
-        self.depth, self.volume = calibrate_walls(scene) if self.faces else (0.0, 0.0)
+        self.layer, self.owners = line_walls(scene)
+        x = self.layer.positions
+        self.behind: dict[str, np.ndarray] = {}
+        for d in range(scene.dim):
+            beyond = {"-": x[:, d] < scene.domain.lower[d], "+": x[:, d] > scene.domain.upper[d]}
+            self.behind |= {AXES[d] + side: mask for side, mask in beyond.items() if mask.any()}
         self.distances = np.linspace(0.0, scene.support, SLOPES)
-        plane = plane_sum(medium.kernel, scene.dim, scene.spacing, scene.support)
-        sums = np.array([plane(d) for d in self.distances])
-        self.slopes = -np.gradient(sums, self.distances)
-        self.moving = {wall.face: wall for wall in scene.moving_walls}
+        self.slopes = np.gradient(medium.kernel.sample(self.distances), self.distances)
+
+    @property
+    def faces(self) -> list[str]:
+        """Names of the faces that have a wall, "x-", "x+" and so on."""
+        return list(self.behind)
 
     def at(self, time: float, x: np.ndarray, rho: np.ndarray, p: np.ndarray) -> list[float]:
         """Forces [N] (per metre of depth in two dimensions) along the outward normals of `faces` at `time` [s].
 
         Positions [m], (N, dim), densities [kg/m^3] and pressures [Pa], (N,), are the particles'.
         """
-        return [self._on(face, time, x, rho, p) for face in self.faces]
+        if not self.behind:
+            return []
+        forces = self._on_particles(time, x, rho, p)
+        return [
+            (1.0 if face[1] == "+" else -1.0) * float(forces[mask, face_axis(face)].sum())
+            for face, mask in self.behind.items()
+        ]
 
-    def _on(self, face: str, time: float, x: np.ndarray, rho: np.ndarray, p: np.ndarray) -> float:
-        scene, medium = self.scene, self.medium
-        axis, inward = face_axis(face), 1.0 if face[1] == "-" else -1.0
-        place = face_position(face, scene.domain)
-        if face in self.moving:
-            place += self.moving[face].displacement(time)
-        distance = inward * (x[:, axis].astype(np.float64) - place) + self.depth
-        near = distance < scene.support
-        distance = distance[near]
-        push = p[near].astype(np.float64) / rho[near].astype(np.float64) ** 2
-        if scene.density == "continuity":
-            slope = 0.0 if scene.gravity_changes else -inward * scene.acceleration[axis] / scene.rest_density
-            push += np.maximum(push + slope * distance, 0.0)
-        slopes = np.interp(distance, self.distances, self.slopes)
-        return float(medium.mass * medium.rest_density * self.volume * (push * slopes).sum())
+    def _on_particles(self, time: float, x: np.ndarray, rho: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Forces [N] on the wall particles, (M, dim)."""
+        scene, layer = self.scene, self.layer
+        places = layer.positions.copy()
+        for number, wall in enumerate(scene.moving_walls):
+            places[self.owners == number, face_axis(wall.face)] += wall.displacement(time)
+        slope = np.zeros(scene.dim) if scene.gravity_changes else -np.asarray(scene.acceleration) / scene.rest_density
+        near = self._near_walls(places, x)
+        x, own = x[near].astype(np.float64), p[near].astype(np.float64) / rho[near].astype(np.float64) ** 2
+        forces = np.zeros_like(places)
+        for i, b, distance2 in near_pairs(x, scene.support, places):
+            gap, distance = x[i] - places[b], np.sqrt(distance2)
+            push = own[i]
+            if scene.density == "continuity":
+                push = push + np.maximum(push + gap @ slope, 0.0)
+            push = (
+                push * layer.volumes[b] * np.interp(distance, self.distances, self.slopes) / np.maximum(distance, 1e-12)
+            )
+            for d in range(scene.dim):
+                forces[:, d] += np.bincount(b, push * gap[:, d], len(places))
+        return self.medium.mass * scene.rest_density * forces
+
+    def _near_walls(self, places: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Mask of the particles, (N,), that may be near a wall particle: all but those well inside the box that is left."""
+        near = np.zeros(len(x), bool)
+        for face, mask in self.behind.items():
+            d, r = face_axis(face), self.scene.support
+            along = places[mask, d]
+            near |= x[:, d] < along.max() + r if face[1] == "-" else x[:, d] > along.min() - r
+        return near

@@ -8,30 +8,35 @@ from collections.abc import Iterator
 import numpy as np
 
 
-def near_pairs(x: np.ndarray, support: float) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield places i, j and squared distances [m^2], (P,) each, of the pairs nearer than `support` [m]; `x` [m] is (N, dim).
+def near_pairs(
+    x: np.ndarray, support: float, others: np.ndarray | None = None
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield places i in `x`, j in `others`, and squared distances [m^2], (P,) each, of the pairs nearer than `support` [m].
 
-    Each pair comes twice, each particle once with itself. Particles are sorted into cells of side `support`; each looks through
-    its own and the adjacent cells, one after the other. Images across periodic faces are not looked at.
+    Positions `x` and `others` [m] are (N, dim) and (M, dim); without `others` pairs are within `x`: each then comes twice, and
+    every particle once with itself. Points are sorted into cells of side `support`; each looks through its own and the adjacent
+    cells, one after the other. Images across periodic faces are not looked at.
     """
-    n, dim = x.shape
-    if n == 0:
+    y = x if others is None else others
+    if not len(x) or not len(y):
         return
-    cell = np.floor((x - x.min(axis=0)) / support).astype(np.int64) + 1  # an empty layer around, so that no index wraps
-    shape = cell.max(axis=0) + 2
+    lowest = np.minimum(x.min(axis=0), y.min(axis=0))
+    cells = [np.floor((points - lowest) / support).astype(np.int64) + 1 for points in (x, y)]
+    shape = np.maximum(cells[0].max(axis=0), cells[1].max(axis=0)) + 2  # an empty layer around, so that no index wraps
     strides = np.cumprod(np.concatenate([[1], shape[:0:-1]]))[::-1]
-    key = cell @ strides
-    order = np.argsort(key, kind="stable")
-    ordered, places = key[order], x[order].astype(np.float64)
-    for offset in itertools.product((-1, 0, 1), repeat=dim):
-        other = ordered + int(np.dot(offset, strides))
-        first, end = np.searchsorted(ordered, other, "left"), np.searchsorted(ordered, other, "right")
+    keys = [cell @ strides for cell in cells]
+    mine, theirs = (np.argsort(key, kind="stable") for key in keys)
+    wanted, there = keys[0][mine], keys[1][theirs]
+    one, two = x[mine].astype(np.float64), y[theirs].astype(np.float64)
+    for offset in itertools.product((-1, 0, 1), repeat=x.shape[1]):
+        cell = wanted + int(np.dot(offset, strides))
+        first, end = np.searchsorted(there, cell, "left"), np.searchsorted(there, cell, "right")
         counts = end - first
-        i = np.repeat(np.arange(n), counts)
+        i = np.repeat(np.arange(len(x)), counts)
         j = np.arange(len(i)) - np.repeat(np.cumsum(counts) - counts, counts) + np.repeat(first, counts)
-        distance2 = ((places[i] - places[j]) ** 2).sum(axis=1)
+        distance2 = ((one[i] - two[j]) ** 2).sum(axis=1)
         near = distance2 < support**2
-        yield order[i[near]], order[j[near]], distance2[near]
+        yield mine[i[near]], theirs[j[near]], distance2[near]
 
 
 def mean_neighbours(x: np.ndarray, support: float) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -215,7 +214,10 @@ def calibrate_walls(scene: Scene) -> tuple[float, float]:
     s, dim, r = scene.spacing, scene.dim, scene.support
     kernel = make_kernel(scene.kernel, dim, r)
     reach = math.ceil(scene.support_ratio)
-    plane = plane_sum(kernel, dim, s, r)
+    lateral2 = sum(g**2 for g in np.meshgrid(*[s * np.arange(-reach, reach + 1)] * (dim - 1)))
+
+    def plane(d: float) -> float:
+        return float(kernel.sample(np.sqrt(lateral2 + d * d)).sum())
 
     def slope(function: Callable[[float], float], d: float) -> float:
         step = 1e-4 * s
@@ -230,17 +232,6 @@ def calibrate_walls(scene: Scene) -> tuple[float, float]:
         middle = 0.5 * (near + far)
         near, far = (middle, far) if slope(plane, middle) / plane(middle) > wanted else (near, middle)
     return near - 0.5 * s, missing(s) / (plane(near) * lattice_sum(kernel, dim, s))
-
-
-def plane_sum(kernel: Any, dim: int, spacing: float, support: float) -> Callable[[float], float]:
-    """Return S(d), the sum of W [1/m^dim] over an infinite lattice line or plane of `spacing` [m], from d [m] above one of it."""
-    reach = math.ceil(support / spacing)
-    lateral2 = sum(g**2 for g in np.meshgrid(*[spacing * np.arange(-reach, reach + 1)] * (dim - 1)))
-
-    def plane(d: float) -> float:
-        return float(kernel.sample(np.sqrt(lateral2 + d * d)).sum())
-
-    return plane
 
 
 def _product(axes: list[np.ndarray]) -> np.ndarray:
