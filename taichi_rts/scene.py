@@ -324,8 +324,8 @@ def load_scene(name: str | Path, *, particles: float | str | None = None, **chan
 
 def _resolve_files(data: dict[str, Any], path: Path) -> None:
     """Let the particle files that the scene in `path` names begin at its folder, which they may not leave."""
-    folder = path.parent.resolve()
-    for k, fluid in enumerate(fluids if isinstance(fluids := data.get("fluids"), list) else []):
+    folder, fluids = path.parent.resolve(), data.get("fluids")
+    for k, fluid in enumerate(fluids if isinstance(fluids, list) else []):
         if isinstance(fluid, dict) and isinstance(fluid.get("file"), str):
             file = (folder / fluid["file"]).resolve()
             if not file.is_relative_to(folder):

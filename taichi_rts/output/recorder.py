@@ -44,6 +44,8 @@ class Recording:
         """Return what writes particles in `dim` dimensions; raises `OutputError` for what contradicts itself or is missing."""
         if (self.video or self.gif) and not self.pictures:
             raise OutputError("--no-frames draws no pictures, of which --video and --gif are made; leave out one")
+        if self.attributes != DEFAULT_ATTRIBUTES and not self.export:
+            raise OutputError("--attributes chooses what --export writes, and nothing is exported; give --export too")
         if self.video:
             require_video()
         return Exporter(self.folder, self.export, self.attributes, dim=dim)

@@ -114,6 +114,7 @@ def test_a_missing_extra_is_named(monkeypatch, tmp_path, name, package, extra):
     [
         (["--export", "obj"], ["'obj' is no format", "vtu"]),
         (["--export", "vtu", "--attributes", "presure"], ["'presure' is no attribute", "did you mean 'pressure'"]),
+        (["--attributes", "id"], ["--attributes", "--export"]),
         (["--no-frames", "--gif"], ["--no-frames", "--gif"]),
         (["--gui", "--export", "ply"], ["--gui", "--export"]),
         (["--panels", "steppers", "--export", "ply"], ["--export", "one run", "--panels"]),
