@@ -14,6 +14,12 @@ from taichi_rts.errors import (
     TimeError,
 )
 from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
+from taichi_rts.output.export import Exporter, write_particles
+from taichi_rts.output.series import Series
+from taichi_rts.particle_files.formats import read_particles
+from taichi_rts.particle_files.frame import ParticleFrame
+from taichi_rts.particle_fluid import Particles
+from taichi_rts.probes import Gauge, Probe
 from taichi_rts.scene import Scene, View, load_scene, scene_names
 from taichi_rts.shapes import Block, Box, Sphere
 from taichi_rts.simulation import Simulation
@@ -30,16 +36,22 @@ __all__ = [
     "Box",
     "Energy",
     "Error",
+    "Exporter",
+    "Gauge",
     "GravityChange",
     "Inflow",
     "LinearField",
     "MovingWall",
     "OutputError",
+    "ParticleFrame",
+    "Particles",
+    "Probe",
     "Regional",
     "RegionalSound",
     "RenderError",
     "Scene",
     "SceneError",
+    "Series",
     "Simulation",
     "SimulationDivergedError",
     "Sphere",
@@ -51,5 +63,7 @@ __all__ = [
     "View",
     "init",
     "load_scene",
+    "read_particles",
     "scene_names",
+    "write_particles",
 ]

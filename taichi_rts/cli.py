@@ -14,6 +14,7 @@ from taichi_rts import backend, report
 from taichi_rts.compare.command import Compare
 from taichi_rts.errors import Error, OutputError, SimulationDivergedError
 from taichi_rts.extremes import Extremes
+from taichi_rts.output.export import DEFAULT_ATTRIBUTES
 from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
 from taichi_rts.rendering.painter import Mode, PictureOptions
 from taichi_rts.stability.command import Stability
@@ -97,6 +98,14 @@ class Run:
     """Several panels in a frame: the paper's Figure 3 or 2, or one for each stepper. They have their own steppers."""
     video: bool = False
     """Also write video.mp4 (needs the extra `video`)."""
+    gif: bool = False
+    """Also write video.gif, of at most 640 pixels across and 25 frames a second."""
+    frames: bool = True
+    """Write pictures; --no-frames for a run that only writes files."""
+    export: tuple[str, ...] = ()
+    """Also write particles at each frame, in any of vtu, ply, npz, bgeo, vtkhdf, and the water's surface (docs/files.md)."""
+    attributes: tuple[str, ...] = DEFAULT_ATTRIBUTES
+    """What files say of each particle: any of id, velocity, density, pressure, level, step, cell_time, sound_speed."""
     debug: bool = False
     """Check at run time what steppers promise (nobody is extrapolated, somebody steps in every pass); adds up momentum."""
     gui: bool = False
@@ -114,6 +123,8 @@ class Run:
         )
         if self.gui and (self.panels or self.debug):
             raise OutputError("--gui shows one run and checks nothing; leave out --panels and --debug, or --gui")
+        if self.gui and (self.video or self.gif or self.export or not self.frames):
+            raise OutputError("--gui saves nothing; leave out --video, --gif, --export and --no-frames, or --gui")
         if self.gui:
             from taichi_rts.rendering.live import watch  # only here, because it needs Vulkan and a display
 
@@ -122,7 +133,10 @@ class Run:
         from taichi_rts.output.recorder import Recorder, Recording, frame_times
 
         folder = self.output_dir if self.output_dir is not None else Path("out") / scene.name
-        recording = Recording(folder, self.export_fps, self.video, self.overwrite)
+        recording = Recording(
+            folder, self.export_fps, self.video, self.overwrite, self.frames, self.gif, self.export, self.attributes
+        )
+        recording.exporter(scene.dim)  # here, so that what is wrong is said before anything starts
         frames = len(frame_times(scene.end_time, self.export_fps))
         check_size(self.width, self.height)
         device = rts.init(self.arch, self.precision)
@@ -145,7 +159,7 @@ class Run:
             report.print_table(
                 sim, recorder.initial_energy[stepper], diagnoses.found.get(stepper), extremes.facts(stepper)
             )
-        report.print_folder(folder, frames)
+        report.print_folder(folder, frames, recorder.files())
 
     def make_stepper(self) -> Any:
         """Build the stepper from the options that were given; raises `StepperError` if one does not belong to it."""

@@ -152,16 +152,21 @@ def pass_facts(statistics: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
 
 
-def print_folder(folder: Path, frames: int) -> None:
+def print_folder(folder: Path, frames: int, files: Mapping[str, Any]) -> None:
     """Say where the results are."""
-    console.print(f"{frames} frames in {folder / 'frames'}, facts in {folder / 'run.json'}", soft_wrap=True)
+    pictures = f"{frames} frames in {folder / 'frames'}, " if "frames" in files else ""
+    exports = {path: None for path in files.values() if isinstance(path, str) and "/NNNNNN" in path}
+    exports.pop("frames/NNNNNN.png", None)
+    particles = f"files of {frames} frames in {', '.join(str(folder / path) for path in exports)}, " if exports else ""
+    series = f"time series in {folder / files['series'][0]}, "
+    console.print(f"{pictures}{particles}{series}facts in {folder / 'run.json'}", soft_wrap=True)
 
 
 def print_scenes(scenes: list[Scene]) -> None:
     """Print a table of scenes."""
     table = Table("name", "dim", "particles", "end [s]", "what it is")
     for scene in scenes:
-        count = sum(fluid.volume for fluid in scene.fluids) / scene.spacing**scene.dim
+        count = scene.volume / scene.spacing**scene.dim
         table.add_row(scene.name, str(scene.dim), f"{count:,.0f}", f"{scene.end_time:g}", scene.description)
     console.print(table)
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from taichi_rts.conditions import AXES, Inflow
+from taichi_rts.particle_fluid import Particles
 from taichi_rts.physics.equation_of_state import Tait
 from taichi_rts.scene import Scene
 from taichi_rts.shapes import Block, Sphere, velocities
@@ -77,13 +78,16 @@ def sample(scene: Scene) -> Sample:
     )
 
 
-def compress(scene: Scene, fluid: Block | Sphere, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def compress(scene: Scene, fluid: Block | Sphere | Particles, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions `x` [m], (N, dim), and densities [kg/m^3], (N,), under the hydrostatic pressure of the fluid's own column.
 
     p = rho_0 g (H - z), and every layer sinks by what those below it give way: g (H z - z^2/2)/c_s^2 at height z over the
-    fluid's lowest point. Without `Scene.hydrostatic` all stays as it is.
+    fluid's lowest point. Without `Scene.hydrostatic` all stays as it is, as do
+    particles that are given one by one.
     """
     rest = np.full(len(x), scene.rest_density)
+    if isinstance(fluid, Particles):
+        return x, rest if fluid.densities is None else fluid.densities
     g = math.hypot(*scene.acceleration)
     if not scene.hydrostatic or g == 0.0:
         return x, rest
@@ -112,8 +116,10 @@ def calibrate_mass(scene: Scene) -> float:
     return scene.rest_density / lattice_sum(kernel, scene.dim, scene.spacing)
 
 
-def fill(scene: Scene, fluid: Block | Sphere) -> np.ndarray:
+def fill(scene: Scene, fluid: Block | Sphere | Particles) -> np.ndarray:
     """Positions [m], (N, dim), of a fluid's particles."""
+    if isinstance(fluid, Particles):
+        return np.clip(fluid.positions, scene.domain.lower, scene.domain.upper)  # rounding may have put one beyond
     return fill_sphere(scene, fluid) if isinstance(fluid, Sphere) else fill_block(scene, fluid)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -19,6 +20,8 @@ from pydantic.dataclasses import dataclass
 from taichi_rts.conditions import AXES, Axis, GravityChange, Inflow, MovingWall
 from taichi_rts.errors import SceneError
 from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
+from taichi_rts.particle_fluid import Particles
+from taichi_rts.probes import Gauge, Probe
 from taichi_rts.scene_checks import contradictions
 from taichi_rts.shapes import Block, Box, Fluid, Sphere, top_speed
 from taichi_rts.sound import FLOOR, RegionalSound, SoundSpeed
@@ -54,7 +57,8 @@ class Scene:
 
     Attributes:
         domain: the box that no particle's centre leaves.
-        fluids: blocks and spheres of fluid; they may touch but not overlap, two spheres stay half a spacing apart.
+        fluids: blocks and spheres of fluid, and `Particles` given one by one; they may touch but not overlap, two spheres stay
+            half a spacing apart.
         spacing: initial particle spacing s [m].
         gravity: acceleration [m/s^2], (dim,); None: 9.81 m/s^2 along -y.
         gravity_changes: from each one's time on gravity is another.
@@ -73,6 +77,8 @@ class Scene:
         periodic: axes ("x", "y", "z") along which the domain repeats itself; they have no walls.
         moving_walls: faces of the domain that move.
         inflows: patches of the domain's faces through which fluid enters.
+        probes: points where a run's time series has the pressure.
+        gauges: lines along gravity on which it has the water's height.
         end_time: how long the scene is worth watching [s].
         view: where pictures are taken from.
 
@@ -98,6 +104,8 @@ class Scene:
     periodic: tuple[Axis, ...] = ()
     moving_walls: tuple[MovingWall, ...] = ()
     inflows: tuple[Inflow, ...] = ()
+    probes: tuple[Probe, ...] = ()
+    gauges: tuple[Gauge, ...] = ()
     end_time: Positive = 1.0
     view: View = Field(default_factory=View)
     name: str = "scene"
@@ -245,6 +253,22 @@ class Scene:
         fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}  # type: ignore[arg-type]
         return Scene(**(fields | changes))
 
+    def __rich_repr__(self) -> Iterator[Any]:
+        yield self.name
+        yield "domain", self.domain
+        yield "fluids", len(self.fluids)
+        yield "particles", round(self.volume / self.spacing**self.dim)
+        yield "spacing", self.spacing
+        yield "end_time", self.end_time
+
+    @property
+    def volume(self) -> float:
+        """Volume [m^3] (area [m^2] in two dimensions) of all fluid at the start."""
+        return sum(
+            fluid.count * self.spacing**self.dim if isinstance(fluid, Particles) else fluid.volume
+            for fluid in self.fluids
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain data that JSON and TOML can hold."""
         return pydantic.TypeAdapter(Scene).dump_python(self, mode="json", exclude_none=True)
@@ -255,12 +279,15 @@ _PARTS = (
     Box,
     Block,
     Sphere,
+    Particles,
     LinearField,
     TaylorGreen,
     StandingWave,
     GravityChange,
     MovingWall,
     Inflow,
+    Probe,
+    Gauge,
     View,
     RegionalSound,
 )
@@ -287,11 +314,26 @@ def load_scene(name: str | Path, *, particles: float | str | None = None, **chan
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise SceneError(f"scene file {str(path)!r} is not valid TOML: {error}") from None
     data = {"name": path.stem} | data
+    _resolve_files(data, path)
     if particles is not None:
         if "spacing" in changes:
             raise SceneError(f"particles {particles!r} and spacing {changes['spacing']!r} are both given; give one")
         data["spacing"] = _spacing_for(scene_from(data, str(path)), parse_count(particles))
     return scene_from(data | changes, str(path))
+
+
+def _resolve_files(data: dict[str, Any], path: Path) -> None:
+    """Let the particle files that the scene in `path` names begin at its folder, which they may not leave."""
+    folder, fluids = path.parent.resolve(), data.get("fluids")
+    for k, fluid in enumerate(fluids if isinstance(fluids, list) else []):
+        if isinstance(fluid, dict) and isinstance(fluid.get("file"), str):
+            file = (folder / fluid["file"]).resolve()
+            if not file.is_relative_to(folder):
+                raise SceneError(
+                    f"{path}: fluids.{k}.file: {fluid['file']!r} leaves the scene's folder {folder}; "
+                    "put the particles or the scene elsewhere"
+                )
+            fluid["file"] = str(file)
 
 
 def scene_from(data: dict[str, Any], source: str = "scene") -> Scene:
@@ -321,8 +363,9 @@ def parse_count(value: float | str) -> int:
 
 
 def _spacing_for(scene: Scene, count: int) -> float:
-    volume = sum(fluid.volume for fluid in scene.fluids)
-    spacing = float((volume / count) ** (1.0 / scene.dim))
+    if any(isinstance(fluid, Particles) for fluid in scene.fluids):
+        raise SceneError(f"particles {count} cannot be had where the scene gives them one by one; leave particles out")
+    spacing = float((scene.volume / count) ** (1.0 / scene.dim))
     for length, periodic in zip(scene.domain.size, scene.is_periodic, strict=True):
         if periodic:  # which has to be a whole number of spacings
             return length / round(length / spacing)

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from taichi_rts.conditions import AXES, face_axis, face_position
+from taichi_rts.neighbours import mean_occupancy, nearest_pair
+from taichi_rts.particle_fluid import LEAST_DISTANCE, Particles
+from taichi_rts.probes import names
 from taichi_rts.shapes import Block, Sphere, separation
 
 if TYPE_CHECKING:
     from taichi_rts.scene import Scene
+
+MOST_CROWDED = 2.0
+"""Particles given one by one may have this many times the lattice's number density on average: compressed water has 1.1."""
+SINGLE = 1e-6
+"""Share of the domain's size by which they may lie outside of it, as single precision rounds."""
 
 
 def contradictions(scene: Scene) -> list[str]:
@@ -18,6 +28,7 @@ def contradictions(scene: Scene) -> list[str]:
     if scene.gravity is not None and len(scene.gravity) != dim:
         faults.append(f"gravity {scene.gravity} has {len(scene.gravity)} components; the domain has {dim}")
     faults += _sound_faults(scene) + _body_force_faults(scene) + _condition_faults(scene)
+    faults += _place_faults(scene, "probes") + _place_faults(scene, "gauges")
     for k, fluid in enumerate(scene.fluids):
         if len(fluid.lower) != dim:
             faults.append(f"fluids.{k}: has {len(fluid.lower)} components; the domain has {dim}")
@@ -26,6 +37,8 @@ def contradictions(scene: Scene) -> list[str]:
         for other in range(k):
             if len(scene.fluids[other].lower) == dim:
                 faults += _pair_faults(scene, k, other)
+    if not faults:
+        faults += _particle_faults(scene)
     if not faults and _guesses_speed(scene) and scene.estimate_max_speed() <= 0.0:
         faults.append("sound_speed: nothing falls or moves at the start, so no default follows; give it a value [m/s]")
     return faults
@@ -132,9 +145,56 @@ def _condition_faults(scene: Scene) -> list[str]:
     return faults
 
 
-def _fluid_faults(scene: Scene, k: int, fluid: Block | Sphere) -> list[str]:
+def _place_faults(scene: Scene, kind: str) -> list[str]:
+    """Find what is wrong with the scene's `kind`, probes or gauges."""
     faults = []
-    slack = _slack(scene)
+    places: Any = getattr(scene, kind)
+    for k, place in enumerate(places):
+        x, low, high = place.position, scene.domain.lower, scene.domain.upper
+        if len(x) != scene.dim:
+            faults.append(f"{kind}.{k}: has {len(x)} components; the domain has {scene.dim}")
+        elif not all(a - _slack(scene) <= b <= c + _slack(scene) for a, b, c in zip(low, x, high, strict=True)):
+            faults.append(f"{kind}.{k}: {x} lies outside the domain from {low} to {high}; move it")
+    found = names(places)
+    if twice := sorted({name for name in found if found.count(name) > 1}):
+        faults.append(f"{kind}: two of them have the name {twice[0]!r}; rename one")
+    return faults
+
+
+def _particle_faults(scene: Scene) -> list[str]:
+    """Find particles that are too near to each other, or were made with a smaller spacing."""
+    given = {k: fluid for k, fluid in enumerate(scene.fluids) if isinstance(fluid, Particles)}
+    faults = []
+    for k, fluid in given.items():
+        spacing = fluid.spacing
+        if spacing is not None and abs(spacing / scene.spacing - 1.0) > 1e-6:
+            faults.append(
+                f"spacing: {scene.spacing} is not the {spacing:.9g} with which the particles of fluids.{k} were made; use that"
+            )
+            continue
+        crowd = mean_occupancy(fluid.positions, scene.support) / scene.support_ratio**scene.dim
+        if crowd > MOST_CROWDED:
+            faults.append(
+                f"spacing: {scene.spacing} is too large for the particles of fluids.{k}, which lie {crowd:.3g} times as close "
+                f"as that makes; use about {scene.spacing * crowd ** (-1.0 / scene.dim):.3g}"
+            )
+    limit = LEAST_DISTANCE * scene.spacing
+    if len(given) == 1:
+        pair = next(iter(given.values())).nearest_pair(limit)
+    else:
+        pair = nearest_pair(np.concatenate([fluid.positions for fluid in given.values()]), limit) if given else None
+    if pair and not faults:
+        owners = [f"{n} of fluids.{k}" for k, fluid in given.items() for n in range(fluid.count)]
+        faults.append(
+            f"particles {owners[pair[1]]} and {owners[pair[2]]} lie {pair[0]:.3g} apart, nearer than {LEAST_DISTANCE:g} spacings "
+            f"{limit:.3g}; remove one of them"
+        )
+    return faults
+
+
+def _fluid_faults(scene: Scene, k: int, fluid: Block | Sphere | Particles) -> list[str]:
+    faults = []
+    slack = SINGLE * max(scene.domain.size) if isinstance(fluid, Particles) else _slack(scene)
     low = all(a >= b - slack for a, b in zip(fluid.lower, scene.domain.lower, strict=True))
     high = all(a <= b + slack for a, b in zip(fluid.upper, scene.domain.upper, strict=True))
     if not (low and high):
@@ -142,6 +202,8 @@ def _fluid_faults(scene: Scene, k: int, fluid: Block | Sphere) -> list[str]:
             f"fluids.{k}: {fluid.outline} leaves the domain from "
             f"{scene.domain.lower} to {scene.domain.upper}; move or shrink it, or enlarge the domain"
         )
+    if isinstance(fluid, Particles):
+        return faults
     if isinstance(fluid, Sphere):
         name, least = "radius", fluid.radius
     else:
@@ -158,7 +220,7 @@ def _pair_faults(scene: Scene, k: int, other: int) -> list[str]:
     if gap < -slack:
         return [f"fluids.{k}: overlaps fluids.{other}; move one of them"]
     # A sphere's particles may lie on its surface, a block's stay half a spacing inside: only two spheres' can coincide.
-    both_round = isinstance(one, Sphere) and isinstance(two, Sphere)
+    both_round = not isinstance(one, Block) and not isinstance(two, Block)
     if both_round and gap < 0.5 * scene.spacing - slack:
         return [
             f"fluids.{k}: lies {max(gap, 0.0):g} from fluids.{other}, nearer than half a spacing {0.5 * scene.spacing:g}, "

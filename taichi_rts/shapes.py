@@ -11,6 +11,7 @@ from pydantic.dataclasses import dataclass
 
 from taichi_rts.errors import SceneError
 from taichi_rts.fields import Field, Velocity
+from taichi_rts.particle_fluid import Particles
 from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, validated
 
 
@@ -117,23 +118,32 @@ class Sphere:
 
 
 def _fluid_tag(data: Any) -> str:
-    is_sphere = isinstance(data, Sphere) or (isinstance(data, dict) and bool({"centre", "radius"} & data.keys()))
-    return "<sphere>" if is_sphere else "<block>"
+    keys = data.keys() if isinstance(data, dict) else set()
+    if isinstance(data, Particles) or {"positions", "velocities", "file", "sha256"} & keys:
+        return "<particles>"
+    return "<sphere>" if isinstance(data, Sphere) or {"centre", "radius"} & keys else "<block>"
 
 
-Fluid = Annotated[Annotated[Block, Tag("<block>")] | Annotated[Sphere, Tag("<sphere>")], Discriminator(_fluid_tag)]
-"""A block, or a sphere if it has a centre or a radius: a mistake in one is not reported for the other as well."""
+Fluid = Annotated[
+    Annotated[Block, Tag("<block>")] | Annotated[Sphere, Tag("<sphere>")] | Annotated[Particles, Tag("<particles>")],
+    Discriminator(_fluid_tag),
+]
+"""A block, a sphere if it has a centre or a radius, or particles: a mistake in one is not reported for the others as well."""
 
 
-def velocities(fluid: Block | Sphere, x: np.ndarray) -> np.ndarray:
+def velocities(fluid: Block | Sphere | Particles, x: np.ndarray) -> np.ndarray:
     """Velocities [m/s], (N, dim), of a fluid's particles at `x` [m], (N, dim)."""
+    if isinstance(fluid, Particles):
+        return np.zeros_like(x) if fluid.velocities is None else fluid.velocities
     if isinstance(fluid.velocity, Field):
         return fluid.velocity.at(x)
     return np.tile(np.asarray(fluid.velocity or (0.0,) * x.shape[1]), (len(x), 1))
 
 
-def top_speed(fluid: Block | Sphere) -> float:
+def top_speed(fluid: Block | Sphere | Particles) -> float:
     """Largest speed [m/s] in a fluid's bounding box."""
+    if isinstance(fluid, Particles):
+        return fluid.top_speed
     if isinstance(fluid.velocity, Field):
         return fluid.velocity.top_speed(np.array(corners(fluid)))
     return math.hypot(*(fluid.velocity or (0.0,)))
@@ -144,7 +154,7 @@ def box_reach(lower: Vector, upper: Vector, direction: Vector) -> float:
     return sum(max(d * a, d * b) for d, a, b in zip(direction, lower, upper, strict=True))
 
 
-def corners(shape: Box | Block | Sphere) -> list[Vector]:
+def corners(shape: Box | Block | Sphere | Particles) -> list[Vector]:
     """Corners [m] of the bounding box, 2^dim of (dim,)."""
     found: list[Vector] = [()]
     for a, b in zip(shape.lower, shape.upper, strict=True):
@@ -152,8 +162,12 @@ def corners(shape: Box | Block | Sphere) -> list[Vector]:
     return found
 
 
-def separation(one: Block | Sphere, two: Block | Sphere) -> float:
+def separation(one: Block | Sphere | Particles, two: Block | Sphere | Particles) -> float:
     """A length [m] that is negative if the two overlap; if one is a sphere, the distance of what does not."""
+    if isinstance(one, Particles):
+        return one.separation(two)
+    if isinstance(two, Particles):
+        return two.separation(one)
     if isinstance(one, Block) and isinstance(two, Block):
         sides = zip(one.lower, one.upper, two.lower, two.upper, strict=True)
         return max(max(c - b, a - d) for a, b, c, d in sides)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import time as clock
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, cast
 
 import numpy as np
 import taichi as ti
+from PIL import Image
 
 from taichi_rts import backend as backends
 from taichi_rts.diagnostics import Energy, Overhead, Tally, measure_energy
 from taichi_rts.errors import Error, SimulationDivergedError, TimeError
+from taichi_rts.frames import frame_times
 from taichi_rts.grid import BlockGrid, Geometry
 from taichi_rts.inflow import Inflows
 from taichi_rts.motion import Motion
@@ -33,6 +36,7 @@ from taichi_rts.stepping.regional import Regional
 REORDER_EVERY = 32  # sorts between moving the state itself into the grid's order, for locality only
 COUNTER_LIMIT = 2**30  # counts on the device are 32-bit; they are collected before they can overflow
 
+OnFrame = Callable[["Simulation"], object]
 
 DENSITIES: dict[str, Any] = {"summation": SummationDensity, "continuity": ContinuityDensity}
 
@@ -179,6 +183,38 @@ class Simulation:
         self._advance(time)
         self._check_finite()
 
+    def run(
+        self, until: float, on_frame: OnFrame | Sequence[OnFrame] | None = None, *, fps: float = 60.0
+    ) -> Simulation:
+        """Run to physical time `until` [s] and call `on_frame`, one or several, with the simulation at each frame; return it.
+
+        Frames are those of a recording with `fps` frames a second: at the start, at all multiples of 1/fps after the present
+        time, and at `until`. Raises as `advance_to` does, and `OutputError` for an impossible `fps`.
+        """
+        looks = [on_frame] if callable(on_frame) else on_frame or []
+        for time in frame_times(until, fps):
+            if time > self._time or time == 0.0 == self._time:
+                self.advance_to(time)
+                for look in looks:
+                    look(self)
+        return self
+
+    def show(self, **options: Any) -> Image.Image:
+        """Return a picture of the present state, which a notebook shows; `options` are those of `PictureOptions`."""
+        from taichi_rts.rendering.painter import Painter, PictureOptions  # only here: nothing else below needs pictures
+
+        return Image.fromarray(Painter(self.scene, PictureOptions(**options)).paint(self))
+
+    def __repr__(self) -> str:
+        stepper = type(self.stepper).__name__
+        return f"Simulation({self.scene.name!r}, {stepper}, {self.count} particles, t = {self._time:g} s)"
+
+    def __rich_repr__(self) -> Iterator[Any]:
+        yield self.scene.name
+        yield "stepper", type(self.stepper).__name__
+        yield "particles", self.count
+        yield "time", self._time
+
     def _potential(self, time: float) -> float:
         """Potential energy [J] that the present positions have in the gravity of `time` [s]."""
         return measure_energy(self.scene, self.medium, *self.state()[:3], time).potential
@@ -262,6 +298,10 @@ class Simulation:
     def steps(self) -> np.ndarray:
         """Steps [s], (N,): level times base step (`Uniform(adaptive=True)`: at most). In order of particle id."""
         return self.particles.to_numpy(self.particles.level) * self.base_step
+
+    def cell_times(self) -> np.ndarray:
+        """Time [s] of each particle's last force evaluation, (N,), by particle id: asynchronous cells run ahead of `time`."""
+        return self.particles.to_numpy(self.particles.updated) * self.timeline.tick
 
     def leads(self) -> np.ndarray:
         """How far [s] the end of each particle's step lies ahead of the earliest end, (N,). In order of particle id."""

@@ -154,9 +154,8 @@ class Compare:
 
     def announce(self, scene: Scene, settings: Settings, count: int) -> None:
         """Say what was chosen."""
-        volume = sum(fluid.volume for fluid in scene.fluids)
         console.print(
-            f"{scene.name}: about {volume / scene.spacing**scene.dim:,.0f} particles (spacing {scene.spacing:.4g} m) to "
+            f"{scene.name}: about {scene.volume / scene.spacing**scene.dim:,.0f} particles (spacing {scene.spacing:.4g} m) to "
             f"{scene.end_time:g} s; {', '.join(settings.steppers)} at λ = {', '.join(f'{c:g}' for c in settings.courants)}; "
             f"{count} runs, each timed {settings.repeats} times, on {settings.arch} in {settings.precision}",
             highlight=False,

@@ -11,9 +11,9 @@ import numpy as np
 
 import taichi_rts as rts
 from taichi_rts.compare.memory import peak_memory, reset_peak_memory
-from taichi_rts.compare.neighbours import mean_neighbours
 from taichi_rts.compare.trajectory import Trajectory
 from taichi_rts.diagnostics import speedup_bound
+from taichi_rts.neighbours import mean_neighbours
 from taichi_rts.rewind import Rewind
 from taichi_rts.scene import scene_from
 from taichi_rts.stability.survival import demanded_density, largest_stable, watch

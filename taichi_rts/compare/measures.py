@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_rts import measuring
 from taichi_rts.compare.trajectory import Trajectory
 from taichi_rts.physics.medium import Medium
 from taichi_rts.sampling import calibrate_mass
@@ -19,8 +20,6 @@ from taichi_rts.scene import Scene
 
 PARTED = 0.01
 """Two runs have parted when the relative L2 difference of their velocities exceeds this, by default."""
-FRONT_RANK = 5
-"""The front is the FRONT_RANK-th largest x, so that single drops that fly ahead do not count."""
 
 
 @dataclass(frozen=True)
@@ -53,14 +52,12 @@ class Yardstick:
         medium = Medium.of(scene, calibrate_mass(scene))
         fastest = max(float(np.linalg.norm(v, axis=1).max()) for v in reference.velocities)
         speed = scene.estimate_max_speed() or fastest
-        axes = scene.periodic
-        periods = [size if "xyz"[d] in axes else np.inf for d, size in enumerate(scene.domain.size)]
         return cls(
             length=float((start.max(axis=0) - start.min(axis=0)).max()) + scene.spacing,
             energy=max(max(row[0] for row in reference.energies), np.finfo(float).tiny),
             pressure=0.5 * scene.rest_density * speed**2,
             momentum=medium.mass * max(len(x) for x in reference.positions) * max(fastest, np.finfo(float).tiny),
-            periods=np.asarray(periods),
+            periods=measuring.periods(scene),
             probes=default_probes(scene, start) if probes is None else probes,
             medium=medium,
         )
@@ -85,10 +82,7 @@ def default_probes(scene: Scene, start: np.ndarray) -> np.ndarray:
 def differences(one: np.ndarray, two: np.ndarray, periods: np.ndarray) -> np.ndarray:
     """Differences of positions [m] of the ids that both have, (N, dim), to the nearest image across periodic faces."""
     n = min(len(one), len(two))
-    gap = one[:n].astype(np.float64) - two[:n]
-    wrapped = np.isfinite(periods)
-    gap[:, wrapped] -= periods[wrapped] * np.round(gap[:, wrapped] / periods[wrapped])
-    return gap
+    return measuring.nearest_image(one[:n].astype(np.float64) - two[:n], periods)
 
 
 def velocity_gap(run: Trajectory, reference: Trajectory, k: int) -> float:
@@ -133,8 +127,7 @@ def positions(run: Trajectory, reference: Trajectory, scale: Yardstick, together
 
 def front_position(run: Trajectory, k: int) -> float:
     """Front of the fluid [m] at sample k: its fifth-largest x."""
-    x = run.positions[k][:, 0]
-    return float(np.partition(x, -FRONT_RANK)[-FRONT_RANK]) if len(x) >= FRONT_RANK else float(x.max())
+    return measuring.front(run.positions[k])
 
 
 def front(run: Trajectory, reference: Trajectory, scale: Yardstick, together: int) -> float | None:
@@ -183,16 +176,7 @@ def momentum(run: Trajectory, reference: Trajectory, scale: Yardstick, together:
 
 def probe_pressures(run: Trajectory, k: int, scale: Yardstick) -> np.ndarray:
     """Pressures [Pa] at the probes, (P,), at sample k: sum_j p_j W_j / sum_j W_j over the support radius, 0 where it is empty."""
-    x = run.positions[k].astype(np.float64)
-    p = run.pressures[k].astype(np.float64)
-    found = np.zeros(len(scale.probes))
-    for i, probe in enumerate(scale.probes):
-        weights = scale.medium.kernel.sample(
-            np.linalg.norm(differences(x, np.broadcast_to(probe, x.shape), scale.periods), axis=1)
-        )
-        if (total := weights.sum()) > 0.0:
-            found[i] = float(weights @ p) / total
-    return found
+    return measuring.interpolate(run.positions[k], run.pressures[k], scale.probes, scale.medium.kernel, scale.periods)
 
 
 ERRORS: dict[str, Callable[[Trajectory, Trajectory, Yardstick, int], float | None]] = {

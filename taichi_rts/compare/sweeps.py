@@ -27,7 +27,7 @@ KINDS: dict[str, Any] = {
 ONE_SOUND_SPEED = ("uniform", "regional", "paper", "asynchronous")
 FIXED = {"courant": "--courants", "preset": "--steppers paper", "end_time": "--end-time"}
 """Parameters that are no sweep, and the option to use instead."""
-SHAPE = ("domain", "fluids", "view", "name", "description")
+SHAPE = ("domain", "fluids", "probes", "gauges", "view", "name", "description")
 """What makes a scene the scene it is, or changes no motion."""
 
 

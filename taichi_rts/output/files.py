@@ -12,7 +12,18 @@ from typing import Any
 
 from taichi_rts.errors import OutputError
 
-ARTEFACTS = ("frames", "run.json", "video.mp4")  # what a run writes, and all that --overwrite removes
+ARTEFACTS = (
+    "frames",
+    "run.json",
+    "video.mp4",
+    "video.gif",
+    "particles",
+    "surface",
+    "series.csv",
+    "series_2.csv",
+    "series_3.csv",
+)
+"""What a run writes, and all that --overwrite removes."""
 
 
 def write_bytes(path: Path, data: bytes) -> None:

@@ -13,8 +13,11 @@ import imageio.v3 as imageio
 import numpy as np
 
 from taichi_rts.errors import OutputError
+from taichi_rts.frames import frame_times
+from taichi_rts.output.export import DEFAULT_ATTRIBUTES, Exporter
 from taichi_rts.output.files import prepare_folder, write_bytes, write_json
-from taichi_rts.output.video import Video, require_video
+from taichi_rts.output.series import Series
+from taichi_rts.output.video import Gif, Video, require_video
 from taichi_rts.panels import Panel
 from taichi_rts.rendering import legend
 from taichi_rts.rendering.painter import Painter, PictureOptions, make_renderer
@@ -26,12 +29,26 @@ PNG_COMPRESSION = 3  # of 9: 40 instead of 120 ms a frame for 10 % more bytes
 
 @dataclasses.dataclass(frozen=True)
 class Recording:
-    """Where a run is recorded to, and how often; `fps` is frames per physical second."""
+    """Where a run is recorded to, what of it, and how often; `fps` is frames per physical second."""
 
     folder: Path
     fps: float = 60.0
     video: bool = False
     overwrite: bool = False
+    pictures: bool = True
+    gif: bool = False
+    export: tuple[str, ...] = ()
+    attributes: tuple[str, ...] = DEFAULT_ATTRIBUTES
+
+    def exporter(self, dim: int) -> Exporter:
+        """Return what writes particles in `dim` dimensions; raises `OutputError` for what contradicts itself or is missing."""
+        if (self.video or self.gif) and not self.pictures:
+            raise OutputError("--no-frames draws no pictures, of which --video and --gif are made; leave out one")
+        if self.attributes != DEFAULT_ATTRIBUTES and not self.export:
+            raise OutputError("--attributes chooses what --export writes, and nothing is exported; give --export too")
+        if self.video:
+            require_video()
+        return Exporter(self.folder, self.export, self.attributes, dim=dim)
 
 
 class Recorder:
@@ -40,21 +57,27 @@ class Recorder:
     def __init__(
         self, scene: Scene, panels: list[Panel], options: PictureOptions, recording: Recording, *, debug: bool = False
     ) -> None:
-        if recording.video:
-            require_video()
+        steppers = dict.fromkeys(panel.stepper for panel in panels)  # one run for all panels that show it
+        if recording.export and len(steppers) > 1:
+            raise OutputError("--export writes the particles of one run, and there are several; leave out --panels")
+        self.exporter = recording.exporter(scene.dim)
         prepare_folder(recording.folder, recording.overwrite)
         self.scene = scene
         self.panels = panels
         self.recording = recording
-        steppers = dict.fromkeys(panel.stepper for panel in panels)  # one run for all panels that show it
         self.runs = {stepper: Simulation(scene, stepper, debug=debug) for stepper in steppers}
         self.initial_energy = {stepper: sim.energy() for stepper, sim in self.runs.items()}
-        if len(panels) > 1:
-            options = dataclasses.replace(options, height=options.height // 2 // 2 * 2)
-        renderer = make_renderer(options)
-        self.painters = [
-            Painter(scene, dataclasses.replace(options, **panel.options), renderer=renderer) for panel in panels
+        self.series = [
+            Series(recording.folder / series_name(number), sim) for number, sim in enumerate(self.runs.values())
         ]
+        self.painters: list[Painter] = []
+        if recording.pictures:
+            if len(panels) > 1:
+                options = dataclasses.replace(options, height=options.height // 2 // 2 * 2)
+            renderer = make_renderer(options)
+            self.painters = [
+                Painter(scene, dataclasses.replace(options, **panel.options), renderer=renderer) for panel in panels
+            ]
 
     def paint(self) -> np.ndarray:
         """Return the picture of all panels at the present time."""
@@ -67,38 +90,45 @@ class Recorder:
 
     def record(self, end_time: float, on_frame: Callable[[float], None] = lambda time: None) -> dict[str, Any]:
         """Run to `end_time` [s], write all frames, and return what `run.json` holds."""
-        frames = self.recording.folder / "frames"
-        video = Video(self.recording.folder / "video.mp4", self.recording.fps) if self.recording.video else None
-        for number, time in enumerate(frame_times(end_time, self.recording.fps)):
+        folder, fps = self.recording.folder, self.recording.fps
+        films: list[Any] = [Video(folder / "video.mp4", fps)] if self.recording.video else []
+        films += [Gif(folder / "video.gif", fps)] if self.recording.gif else []
+        for number, time in enumerate(frame_times(end_time, fps)):
             for sim in self.runs.values():
                 sim.advance_to(time)
-            image = self.paint()
-            data = imageio.imwrite("<bytes>", image, extension=".png", compress_level=PNG_COMPRESSION)
-            write_bytes(frames / f"{number:06d}.png", data)
-            if video:
-                video.append(image)
+                self.exporter(sim)
+            for series in self.series:
+                series()
+            if self.recording.pictures:
+                image = self.paint()
+                data = imageio.imwrite("<bytes>", image, extension=".png", compress_level=PNG_COMPRESSION)
+                write_bytes(folder / "frames" / f"{number:06d}.png", data)
+                for film in films:
+                    film.append(image)
             on_frame(time)
-        if video:
-            video.close()
+        for film in films:
+            film.close()
         summary = self.summary()
         write_json(self.recording.folder / "run.json", summary)
         return summary
 
     def summary(self) -> dict[str, Any]:
-        """Describe the run: the first simulation in full, the others under `panels`."""
+        """Describe the run: the first simulation in full, the others under `panels`, and what was written under `files`."""
         runs = [describe_run(sim, self.initial_energy[stepper]) for stepper, sim in self.runs.items()]
-        return runs[0] | ({"panels": runs} if len(runs) > 1 else {})
+        return runs[0] | ({"panels": runs} if len(runs) > 1 else {}) | {"files": self.files()}
+
+    def files(self) -> dict[str, Any]:
+        """Say what is in the folder: paths by kind, where NNNNNN is a frame's number, and the frames' times [s]."""
+        wanted = self.recording
+        found = {"frames": "frames/NNNNNN.png"} if wanted.pictures else {}
+        found |= {name: path for name, path in (("video", "video.mp4"), ("gif", "video.gif")) if getattr(wanted, name)}
+        series = [each.path.name for each in self.series]
+        return {**found, **self.exporter.files, "series": series, "times": self.series[0].times}
 
 
-def frame_times(end_time: float, fps: float) -> list[float]:
-    """Times [s] of the frames: every 1/fps from 0, and `end_time` itself as the last."""
-    if not 0.0 < fps <= 1e6:
-        raise OutputError(f"export_fps {fps:g} is not above 0 and at most 1e6; 60 is usual")
-    count = int(np.floor(end_time * fps * (1 + 1e-9)))
-    times = [k / fps for k in range(count + 1)]
-    if times[-1] < end_time * (1 - 1e-9):
-        times.append(end_time)
-    return times
+def series_name(number: int) -> str:
+    """Name of the time series of run `number`, counted from 0."""
+    return "series.csv" if number == 0 else f"series_{number + 1}.csv"
 
 
 def describe_run(sim: Simulation, initial_energy: Any) -> dict[str, Any]:

@@ -1,15 +1,22 @@
-"""An mp4 beside the frames, through imageio-ffmpeg (extra `video`)."""
+"""Films beside the frames: an mp4 through imageio-ffmpeg (extra `video`), and a gif through Pillow."""
 
 from __future__ import annotations
 
 import importlib.util
+import math
 from pathlib import Path
 from typing import Any
 
 import imageio.v2 as imageio
 import numpy as np
+from PIL import Image
 
 from taichi_rts.errors import OutputError
+
+GIF_FPS = 25.0
+GIF_WIDTH = 640
+"""A gif has at most as many frames a second and pixels across: twice of either, and it is too large for a web page."""
+GIF_COLOURS = 128
 
 
 def require_video() -> None:
@@ -36,3 +43,31 @@ class Video:
         """Finish the file and give it its name."""
         self.writer.close()
         self.temporary.replace(self.path)
+
+
+class Gif:
+    """The same as a gif that repeats for ever, at the same speed with every n-th frame, smaller and with fewer colours."""
+
+    def __init__(self, path: Path, fps: float) -> None:
+        self.path = path
+        self.every = max(1, math.ceil(fps / GIF_FPS))
+        self.duration = 1e3 * self.every / fps
+        """Time [ms] for which a frame is shown; the file holds it to 10 ms."""
+        self.seen = 0
+        self.frames: list[Image.Image] = []
+
+    def append(self, image: np.ndarray) -> None:
+        """Add one frame, if it is its turn."""
+        if self.seen % self.every == 0:
+            picture = Image.fromarray(image)
+            if picture.width > GIF_WIDTH:
+                picture = picture.resize((GIF_WIDTH, round(picture.height * GIF_WIDTH / picture.width)))
+            self.frames.append(picture.quantize(GIF_COLOURS, dither=Image.Dither.NONE))
+        self.seen += 1
+
+    def close(self) -> None:
+        """Write the file to a temporary name, then give it its own."""
+        temporary = self.path.with_name(f".{self.path.stem}.part.gif")
+        first, *rest = self.frames
+        first.save(temporary, save_all=True, append_images=rest, duration=self.duration, loop=0, optimize=False)
+        temporary.replace(self.path)

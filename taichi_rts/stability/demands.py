@@ -89,7 +89,7 @@ def settled_depth(scene: Scene, gravity: tuple[float, ...]) -> float:
         return 0.0
     size = list(scene.domain.size)
     across = math.prod(size) / size[int(np.argmax(np.abs(gravity)))]
-    return sum(fluid.volume for fluid in scene.fluids) / across
+    return scene.volume / across
 
 
 def _fall(scene: Scene, fluid: Any) -> float:

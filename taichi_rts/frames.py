@@ -1,0 +1,18 @@
+"""When a run is looked at."""
+
+from __future__ import annotations
+
+import math
+
+from taichi_rts.errors import OutputError
+
+
+def frame_times(end_time: float, fps: float) -> list[float]:
+    """Times [s] of the frames: every 1/fps from 0, and `end_time` itself as the last."""
+    if not 0.0 < fps <= 1e6:
+        raise OutputError(f"export_fps {fps:g} is not above 0 and at most 1e6; 60 is usual")
+    count = math.floor(end_time * fps * (1 + 1e-9))
+    times = [k / fps for k in range(count + 1)]
+    if times[-1] < end_time * (1 - 1e-9):
+        times.append(end_time)
+    return times

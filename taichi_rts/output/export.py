@@ -1,0 +1,102 @@
+"""Particles of a running simulation into files for other tools, one a frame (`particle_files` knows the formats)."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from taichi_rts.errors import OutputError
+from taichi_rts.output.files import write_bytes
+from taichi_rts.particle_files.formats import require_format
+from taichi_rts.particle_files.frame import ParticleFrame
+from taichi_rts.particle_files.vtu import collection
+from taichi_rts.simulation import Simulation
+
+State = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+ATTRIBUTES: dict[str, Callable[[Simulation, State], np.ndarray]] = {
+    "id": lambda sim, state: np.arange(sim.count, dtype=np.int32),
+    "velocity": lambda sim, state: state[1],
+    "density": lambda sim, state: state[2],
+    "pressure": lambda sim, state: sim.medium.equation_of_state.pressure_numpy(state[2]),
+    "level": lambda sim, state: state[3],
+    "step": lambda sim, state: sim.steps(),
+    "cell_time": lambda sim, state: sim.cell_times(),
+    "sound_speed": lambda sim, state: sim.sound_speeds(),
+}
+"""What can be known of a particle, by name: to add one, write a function of a simulation and its `state()`."""
+DEFAULT_ATTRIBUTES = ("id", "velocity", "density", "pressure", "level")
+
+
+def require_attributes(names: Sequence[str]) -> None:
+    """Raise `OutputError` for a name that is no attribute."""
+    for name in names:
+        if name not in ATTRIBUTES:
+            near = difflib.get_close_matches(name, ATTRIBUTES, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise OutputError(f"--attributes {name!r} is no attribute; choose from {', '.join(ATTRIBUTES)}{hint}")
+
+
+def capture(sim: Simulation, attributes: Sequence[str] = DEFAULT_ATTRIBUTES) -> ParticleFrame:
+    """Return the particles of `sim` at its present time; reals are of its precision."""
+    require_attributes(attributes)
+    state = sim.state()
+    found = {name: ATTRIBUTES[name](sim, state) for name in attributes}
+    reals = {
+        name: values.astype(state[0].dtype, copy=False) for name, values in found.items() if values.dtype.kind == "f"
+    }
+    return ParticleFrame(state[0], found | reals, sim.time, sim.scene.spacing)
+
+
+def write_particles(path: str | Path, frame: ParticleFrame) -> None:
+    """Write `frame` to a vtu, ply, npz, bgeo or vtkhdf file, by its suffix; raises `OutputError`."""
+    path = Path(path)
+    each = require_format(path.suffix[1:].lower(), frame.dim)
+    assert each.write is not None  # for mypy
+    write_bytes(path, each.write(frame))
+
+
+class Exporter:
+    """Writes the particles of a simulation each time it is called, to FOLDER/particles/000000.vtu and so on.
+
+    Surfaces go to FOLDER/surface. With "vtu" FOLDER/particles/particles.pvd lists the frames with their times. Files of the
+    same name are replaced. Raises `OutputError` at once for a format or an attribute that cannot be had.
+    """
+
+    def __init__(
+        self,
+        folder: str | Path,
+        formats: Sequence[str] = ("vtu",),
+        attributes: Sequence[str] = DEFAULT_ATTRIBUTES,
+        *,
+        dim: int | None = None,
+    ) -> None:
+        self.folder = Path(folder)
+        self.formats = {name: require_format(name, dim) for name in dict.fromkeys(formats)}
+        self.attributes = tuple(dict.fromkeys(attributes))
+        require_attributes(self.attributes)
+        self.times: list[float] = []
+        """Times [s] of the frames written."""
+
+    def __call__(self, sim: Simulation) -> None:
+        """Write the next frame."""
+        if not self.formats:
+            return
+        frame = capture(sim, self.attributes)
+        for name in self.formats:
+            require_format(name, frame.dim)
+        self.times.append(sim.time)
+        for each in self.formats.values():
+            assert each.write is not None  # for mypy
+            write_bytes(self.folder / each.folder / f"{len(self.times) - 1:06d}{each.suffix}", each.write(frame))
+        if "vtu" in self.formats:
+            names = [(time, f"{number:06d}.vtu") for number, time in enumerate(self.times)]
+            write_bytes(self.folder / "particles" / "particles.pvd", collection(names))
+
+    @property
+    def files(self) -> dict[str, str]:
+        """Where the files are, below the folder, by format: NNNNNN stands for the number of the frame."""
+        found = {name: f"{each.folder}/NNNNNN{each.suffix}" for name, each in self.formats.items()}
+        return found | ({"pvd": "particles/particles.pvd"} if "vtu" in self.formats else {})

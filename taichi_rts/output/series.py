@@ -1,0 +1,94 @@
+"""What changes with time in numbers: a CSV file with a row for each frame."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+
+import numpy as np
+
+from taichi_rts import measuring, probes
+from taichi_rts.conditions import AXES
+from taichi_rts.errors import OutputError
+from taichi_rts.measuring import FaceForces
+from taichi_rts.output.files import write_bytes
+from taichi_rts.simulation import Simulation
+
+
+class Series:
+    """The time series of `sim` in the file `path`: each call adds a row for its present time; an earlier file is replaced.
+
+    Columns: time [s]; kinetic_energy, potential_energy, internal_energy [J]; front (fifth-largest x), centre_x ... [m], the
+    centre of mass; max_speed [m/s]; level_n, the share of particles whose step is n base steps (where levels double: n up to
+    2n - 1); particle_updates so far; pressure_NAME [Pa] of each probe of the scene; height_NAME [m] of each gauge;
+    force_FACE [N], the pressure force on each wall of the domain along its outward normal (`measuring.FaceForces`). In two
+    dimensions energies and forces are per metre of depth.
+    """
+
+    def __init__(self, path: str | Path, sim: Simulation) -> None:
+        self.path = Path(path)
+        self.sim = sim
+        self.forces = FaceForces(sim.scene, sim.medium)
+        self.times: list[float] = []
+        """Times [s] of the rows written."""
+
+    def __call__(self, sim: Simulation | None = None) -> None:
+        """Add a row; `sim` is the one it was made for, for callers that name it."""
+        row = self.measure()
+        line = ",".join(f"{value:.9g}" for value in row.values()) + "\n"
+        if self.times:
+            append(self.path, line.encode())
+        else:
+            write_bytes(self.path, (",".join(row) + "\n" + line).encode())
+        self.times.append(self.sim.time)
+
+    def measure(self) -> dict[str, float]:
+        """Return the present values by column."""
+        sim, scene = self.sim, self.sim.scene
+        x, v, rho, level = sim.state()
+        p = sim.medium.equation_of_state.pressure_numpy(rho)
+        lengths = measuring.periods(scene)
+        points = np.array([probe.position for probe in scene.probes]).reshape(-1, scene.dim)
+        pressures = measuring.interpolate(x, p, points, sim.medium.kernel, lengths)
+        heights = [measuring.water_height(scene, sim.medium, x, np.asarray(g.position)) for g in scene.gauges]
+        return {
+            "time": sim.time,
+            **{f"{name}_energy": value for name, value in sim.energy()._asdict().items()},
+            "front": measuring.front(x),
+            **dict(zip((f"centre_{axis}" for axis in AXES), x.mean(axis=0, dtype=np.float64), strict=False)),
+            "max_speed": float(np.linalg.norm(v, axis=1).max()),
+            **self._shares(level),
+            "particle_updates": sim.statistics["particle_updates"],
+            **{f"pressure_{name}": value for name, value in zip(probes.names(scene.probes), pressures, strict=True)},
+            **{f"height_{name}": value for name, value in zip(probes.names(scene.gauges), heights, strict=True)},
+            **{
+                f"force_{face}": value
+                for face, value in zip(self.forces.faces, self.forces.at(sim.time, x, rho, p), strict=True)
+            },
+        }
+
+    def _shares(self, level: np.ndarray) -> dict[str, float]:
+        schedule = self.sim.schedule
+        shares = np.bincount(level, minlength=schedule.levels + 1)[1:] / len(level)
+        first = 2 ** np.arange(schedule.levels.bit_length()) if schedule.levels_double else np.arange(len(shares)) + 1
+        sums = np.add.reduceat(shares, first - 1)
+        return {f"level_{n}": float(share) for n, share in zip(first, sums, strict=True)}
+
+
+def append(path: Path, line: bytes) -> None:
+    """Add a whole line to the file `path`; raises `OutputError`, and then leaves it as it was."""
+    try:
+        before = path.stat().st_size
+        try:
+            with path.open("ab", buffering=0) as file:
+                if file.write(line) != len(line):
+                    raise OSError(28, os.strerror(28))
+        except OSError:
+            with contextlib.suppress(OSError):
+                os.truncate(path, before)
+            raise
+    except OSError as error:
+        raise OutputError(
+            f"{path} cannot be written: {error.strerror}; free some space or choose another --output-dir"
+        ) from None
