@@ -1,6 +1,6 @@
 """What the regional sound speed saves, and what it costs in accuracy: the figures of docs/regional_sound_speed.md.
 
-python tests/benchmarks/regional_sound.py [speed|extremes|rule ...] [--particles 100k] [--scenes projectile,...]
+python tests/benchmarks/regional_sound.py [speed|extremes|rule|pool ...] [--particles 100k] [--scenes projectile,...]
 speed takes about 25 minutes on 2 idle cores at 100k particles, the others a few minutes at their 6k.
 """
 
@@ -185,7 +185,51 @@ def rule(names: list[str], particles: str, courants: list[float], steppers: str)
             )
 
 
-PARTS = {part.__name__: part for part in (speed, extremes, rule)}
+POOL_END = 20.0  # s
+
+
+def pool(names: list[str], particles: str, courants: list[float], steppers: str) -> None:
+    """A pool 1 m deep and wide (2D) in a scene whose cap is 100 m/s: does it lie still, as deep as it should?"""
+    spacing, gravity = 0.025, 9.81
+    scene = rts.Scene(domain=rts.Box((0, 0), (1, 1.4)), fluids=[rts.Block((0, 0), (1, 1))], spacing=spacing)
+    regional = scene.replace(sound_speed=rts.RegionalSound(cap=100.0))
+    print()
+    quarters = [f"{k * POOL_END / 4:g}-{(k + 1) * POOL_END / 4:g} s" for k in range(4)]
+    head(
+        "run",
+        *(f"kinetic [J], {q}" for q in quarters),
+        "depth over predicted, last",
+        "pressure error, last",
+        "updates [M]",
+    )
+    for label, where, stepper in (
+        ("uniform", scene, rts.Uniform()),
+        ("regional-c", regional, rts.Regional()),
+        ("asynchronous-c", regional, rts.Asynchronous()),
+    ):
+        if label not in steppers:
+            continue
+        sim = rts.Simulation(where, stepper)
+        kinetic, depth, pressure = [], [], []
+        for time in np.linspace(0.0, POOL_END, 401)[1:]:
+            sim.advance_to(time)
+            y, p = sim.positions()[:, 1], sim.pressures()
+            surface = np.sort(y)[-round(1.0 / spacing) :].mean() + 0.5 * spacing
+            compression = gravity * np.clip(1.0 - y, 0.0, 1.0) / sim.sound_speeds() ** 2
+            bulk = (y > 0.15) & (y < 0.8)
+            kinetic.append(sim.energy().kinetic)
+            depth.append(surface / (1.0 - compression.mean()))
+            pressure.append(p[bulk].mean() / (scene.rest_density * gravity * (surface - y[bulk].mean())) - 1.0)
+        row(
+            label,
+            *(f"{k:.3g}" for k in np.reshape(kinetic, (4, -1)).mean(axis=1)),
+            f"{np.mean(depth[-100:]):.4f}",
+            f"{np.mean(pressure[-100:]):+.1%}",
+            f"{sim.statistics['particle_updates'] / 1e6:.1f}",
+        )
+
+
+PARTS = {part.__name__: part for part in (speed, extremes, rule, pool)}
 
 
 def main(
