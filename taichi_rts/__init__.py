@@ -14,6 +14,15 @@ from taichi_rts.errors import (
     TimeError,
 )
 from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
+from taichi_rts.obstacles import (
+    BoxObstacle,
+    ConstantMotion,
+    CylinderObstacle,
+    Keyframes,
+    MeshObstacle,
+    PolygonObstacle,
+    SphereObstacle,
+)
 from taichi_rts.scene import Scene, View, load_scene, scene_names
 from taichi_rts.shapes import Block, Box, Sphere
 from taichi_rts.simulation import Simulation
@@ -28,13 +37,19 @@ __all__ = [
     "BackendError",
     "Block",
     "Box",
+    "BoxObstacle",
+    "ConstantMotion",
+    "CylinderObstacle",
     "Energy",
     "Error",
     "GravityChange",
     "Inflow",
+    "Keyframes",
     "LinearField",
+    "MeshObstacle",
     "MovingWall",
     "OutputError",
+    "PolygonObstacle",
     "Regional",
     "RegionalSound",
     "RenderError",
@@ -43,6 +58,7 @@ __all__ = [
     "Simulation",
     "SimulationDivergedError",
     "Sphere",
+    "SphereObstacle",
     "StandingWave",
     "StepperError",
     "TaylorGreen",

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from taichi_rts.conditions import AXES, Inflow
+from taichi_rts.layers import line_solid, shares
 from taichi_rts.physics.equation_of_state import Tait
 from taichi_rts.scene import Scene
 from taichi_rts.shapes import Block, Sphere, velocities
 from taichi_rts.smoothing import lattice_sum, make_kernel
+from taichi_rts.solids import Solid, make_solid
 
 CONTINUED_LATTICE = 1.0
 WALL_STIFFNESS = 4.0 / 3.0
@@ -43,13 +45,23 @@ class WallLayer:
         """Return those that `mask`, (M,), names."""
         return replace(self, positions=self.positions[mask], normals=self.normals[mask], volumes=self.volumes[mask])
 
+    def joined(self, others: Sequence[WallLayer]) -> WallLayer:
+        """Return these and those of `others`, which have the same stiffness, behind them."""
+        layers = [self, *others] if len(self.positions) else list(others) or [self]
+        return replace(
+            layers[0],
+            positions=np.concatenate([layer.positions for layer in layers]),
+            normals=np.concatenate([layer.normals for layer in layers]),
+            volumes=np.concatenate([layer.volumes for layer in layers]),
+        )
+
 
 @dataclass(frozen=True)
 class Sample:
     """Particles at the start: positions [m] and velocities [m/s], (N, dim), densities [kg/m^3], viscosities [m^2/s], (N,).
 
     All have one mass [kg]. `walls` are the wall particles, (M,), and `owners`, (M,), the number of the moving wall that each
-    is part of, -1 for those at rest.
+    is part of, -1 for those at rest. `obstacles` are the wall particles of each obstacle, as it stands at time 0.
     """
 
     positions: np.ndarray
@@ -59,11 +71,13 @@ class Sample:
     mass: float
     walls: WallLayer
     owners: np.ndarray
+    obstacles: tuple[WallLayer, ...] = ()
 
 
 def sample(scene: Scene) -> Sample:
-    """Fill the scene's fluids with a lattice and line its walls."""
-    positions = [fill(scene, fluid) for fluid in scene.fluids]
+    """Fill the scene's fluids with a lattice, but not where obstacles are, and line its walls and obstacles."""
+    solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
+    positions = [keep_outside(scene, solids, fill(scene, fluid)) for fluid in scene.fluids]
     moving = [velocities(fluid, x) for fluid, x in zip(scene.fluids, positions, strict=True)]
     pressed = [compress(scene, fluid, x) for fluid, x in zip(scene.fluids, positions, strict=True)]
     viscosities = [np.full(len(x), nu) for x, nu in zip(positions, scene.viscosities, strict=False)]
@@ -74,6 +88,7 @@ def sample(scene: Scene) -> Sample:
         np.concatenate(viscosities),
         calibrate_mass(scene),
         *line_walls(scene),
+        line_obstacles(scene, solids),
     )
 
 
@@ -190,6 +205,36 @@ def line_walls(scene: Scene) -> tuple[WallLayer, np.ndarray]:
         first, last = np.asarray(inflow.lower) - reach, np.asarray(inflow.upper) + reach
         behind_patches |= ((layer.positions >= first) & (layer.positions <= last)).all(axis=1)
     return layer.choose(~behind_patches), np.concatenate(owners)[~behind_patches]
+
+
+def keep_outside(scene: Scene, solids: Sequence[Solid], x: np.ndarray) -> np.ndarray:
+    """Leave out of `x` [m], (N, dim), what lies in an obstacle or nearer to it than half a spacing, as at the walls."""
+    for solid in solids:
+        x = x[solid.distance(x) >= (0.5 - 1e-3) * scene.spacing]
+    return x
+
+
+def line_obstacles(scene: Scene, solids: Sequence[Solid]) -> tuple[WallLayer, ...]:
+    """One layer of wall particles below the surface of each obstacle: at the depth and with the volume of `calibrate_walls`.
+
+    Where they are closer than in the domain's walls, or further apart, their volumes are less, or more (`layers.shares`).
+    Those of obstacles at rest are left out where the domain ends and inside other obstacles at rest, which have their own.
+    """
+    depth, volume = calibrate_walls(scene) if solids else (0.0, 0.0)
+    at_rest = [obstacle.motion is None for obstacle in scene.obstacles]
+    layers = []
+    for k, solid in enumerate(solids):
+        x = line_solid(solid, depth, scene.spacing)
+        volumes = volume * shares(x, scene.spacing)
+        if at_rest[k]:
+            kept = ((x >= scene.domain.lower) & (x <= scene.domain.upper)).all(axis=1)
+            for other, its in zip(solids[:k], at_rest, strict=False):
+                if its:
+                    kept &= other.distance(x) > -0.99 * depth
+            x, volumes = x[kept], volumes[kept]
+        normals = solid.normals(x, 0.1 * scene.spacing)
+        layers.append(WallLayer(x, normals, volumes, depth, wall_stiffness(scene)))
+    return tuple(layers)
 
 
 def wall_stiffness(scene: Scene) -> float:

@@ -16,9 +16,11 @@ from annotated_types import Len
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from taichi_rts.bodies import bodies
 from taichi_rts.conditions import AXES, Axis, GravityChange, Inflow, MovingWall
 from taichi_rts.errors import SceneError
 from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
+from taichi_rts.obstacles import SHAPES, ConstantMotion, Keyframes, Obstacle
 from taichi_rts.scene_checks import contradictions
 from taichi_rts.shapes import Block, Box, Fluid, Sphere, top_speed
 from taichi_rts.sound import FLOOR, RegionalSound, SoundSpeed
@@ -73,6 +75,7 @@ class Scene:
         periodic: axes ("x", "y", "z") along which the domain repeats itself; they have no walls.
         moving_walls: faces of the domain that move.
         inflows: patches of the domain's faces through which fluid enters.
+        obstacles: rigid bodies, at rest or moving as prescribed (`taichi_rts.obstacles`); fluid inside them is left out.
         end_time: how long the scene is worth watching [s].
         view: where pictures are taken from.
 
@@ -98,6 +101,7 @@ class Scene:
     periodic: tuple[Axis, ...] = ()
     moving_walls: tuple[MovingWall, ...] = ()
     inflows: tuple[Inflow, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
     end_time: Positive = 1.0
     view: View = Field(default_factory=View)
     name: str = "scene"
@@ -216,14 +220,18 @@ class Scene:
             for fluid in self.fluids
         )
 
+    @property
+    def wall_speed(self) -> float:
+        """Largest speed [m/s] of a moving wall or of a point of a moving obstacle."""
+        return max([0.0, *(wall.top_speed for wall in self.moving_walls), *(body.top_speed for body in bodies(self))])
+
     def estimate_max_speed(self) -> float:
         """Largest speed [m/s] any fluid can reach by falling from where it is: max of sqrt(|v|^2 + 2 g H).
 
         H [m] is the height of a fluid's top above the lowest corner of the domain, along gravity, |v| the largest speed in
-        its bounding box, or of an inflow, or of a moving wall. After a change of gravity fluid may fall through all of the
-        domain; along a periodic axis it falls once around. A body force is left out.
+        its bounding box, or of an inflow, a moving wall or an obstacle. After a change of gravity fluid may fall through all
+        of the domain; along a periodic axis it falls once around. A body force is left out.
         """
-        walls = [wall.top_speed for wall in self.moving_walls]
         uphill = tuple(-a for a in self.acceleration)
         starts = [(top_speed(fluid), fluid.reach(uphill)) for fluid in self.fluids]
         starts += [(math.hypot(*inflow.velocity), inflow.reach(uphill)) for inflow in self.inflows]
@@ -233,7 +241,7 @@ class Scene:
             falls.append(
                 (top, sum(abs(g) * length for g, length in zip(change.gravity, self.domain.size, strict=False)))
             )
-        return max(*walls, *(math.sqrt(speed**2 + 2.0 * fall) for speed, fall in falls), 0.0)
+        return max(self.wall_speed, *(math.sqrt(speed**2 + 2.0 * fall) for speed, fall in falls))
 
     @property
     def floor_potential(self) -> float:
@@ -263,6 +271,9 @@ _PARTS = (
     Inflow,
     View,
     RegionalSound,
+    *SHAPES.values(),
+    ConstantMotion,
+    Keyframes,
 )
 _KEYS = [key for cls in _PARTS for key in cls.__dataclass_fields__]  # type: ignore[attr-defined]
 
@@ -286,12 +297,30 @@ def load_scene(name: str | Path, *, particles: float | str | None = None, **chan
         raise SceneError(f"scene file {str(path)!r} cannot be read: {error.strerror}; check the path") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise SceneError(f"scene file {str(path)!r} is not valid TOML: {error}") from None
-    data = {"name": path.stem} | data
+    data = with_files_beside({"name": path.stem} | data, path)
     if particles is not None:
         if "spacing" in changes:
             raise SceneError(f"particles {particles!r} and spacing {changes['spacing']!r} are both given; give one")
         data["spacing"] = _spacing_for(scene_from(data, str(path)), parse_count(particles))
     return scene_from(data | changes, str(path))
+
+
+def with_files_beside(data: dict[str, Any], path: Path) -> dict[str, Any]:
+    """Return the data of the scene file `path` with its meshes' files relative to its folder, which they may not leave."""
+    bodies = data.get("obstacles")
+    if not isinstance(bodies, list):
+        return data
+    folder, resolved = path.resolve().parent, []
+    for k, body in enumerate(bodies):
+        if isinstance(body, dict) and isinstance(body.get("file"), str):
+            file = (folder / body["file"]).resolve()
+            if not file.is_relative_to(folder):
+                raise SceneError(
+                    f"{path}: obstacles.{k}.file {body['file']!r} leaves the scene's folder {str(folder)!r}; put it there"
+                )
+            body = body | {"file": str(file)}
+        resolved.append(body)
+    return data | {"obstacles": resolved}
 
 
 def scene_from(data: dict[str, Any], source: str = "scene") -> Scene:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from taichi_rts.conditions import AXES, face_axis, face_position
+from taichi_rts.obstacle_checks import obstacle_faults
 from taichi_rts.shapes import Block, Sphere, separation
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ def contradictions(scene: Scene) -> list[str]:
         for other in range(k):
             if len(scene.fluids[other].lower) == dim:
                 faults += _pair_faults(scene, k, other)
+    faults += obstacle_faults(scene)
     if not faults and _guesses_speed(scene) and scene.estimate_max_speed() <= 0.0:
         faults.append("sound_speed: nothing falls or moves at the start, so no default follows; give it a value [m/s]")
     return faults

@@ -107,7 +107,7 @@ class SoundRule:
         wish, own = 0.0, 0.0
         if first < end:
             p = self.particles
-            speed2, pressure = self.maxima.wall_speed2(block), 0.0
+            speed2, pressure = self.maxima.wall_speed2(block, now, tick), 0.0
             for k in range(first, end):
                 i = self.grid.order[k]
                 v = p.v[i] + p.a[i] * (ti.cast(now - p.updated[i], float) * tick)
