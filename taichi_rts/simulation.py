@@ -20,6 +20,7 @@ from taichi_rts.particles import Neighbourhood, Particles
 from taichi_rts.physics.continuity import ContinuityDensity, DensityDiffusion, MirroredPressure
 from taichi_rts.physics.density import SummationDensity
 from taichi_rts.physics.floating_reference import FloatingReference
+from taichi_rts.physics.forces import ForceMeter, ObstacleForces
 from taichi_rts.physics.medium import Medium
 from taichi_rts.physics.momentum import Gravity, MomentumEquation, Pressure
 from taichi_rts.physics.moving_walls import MovingFace
@@ -109,6 +110,8 @@ class Simulation:
             law = FloatingReference(self.medium.equation_of_state, self.particles, self.sound)
             self.medium = dataclasses.replace(self.medium, equation_of_state=law)
         self.near = Neighbourhood(capacity, scene.dim, backend, needs)
+        self._obstacle_layers = start.obstacles
+        self._meter: ForceMeter | None = None
         self.walls = make_walls(scene, start, self.near, self.grid, backend)
         self.density = density(self.particles, self.near, self.grid, self.walls, self.medium, backend)
         gravity = Gravity(scene)
@@ -345,6 +348,17 @@ class Simulation:
     def momentum(self) -> np.ndarray:
         """Total momentum [kg m/s], (dim,), at `time`."""
         return self.medium.mass * self.velocities().astype(np.float64).sum(axis=0)
+
+    def obstacle_forces(self) -> ObstacleForces:
+        """Forces [N] and torques [N m] of the fluid on each obstacle, in the scene's order, at the last step up to `time`.
+
+        The first call compiles; asking changes nothing in the run. Raises `Error` for a scene without obstacles.
+        """
+        if not self.scene.obstacles:
+            raise Error(f"scene {self.scene.name!r} has 0 obstacles, so no force acts on one; give it at least 1")
+        if self._meter is None:
+            self._meter = ForceMeter(self.scene, self.motion, self._obstacle_layers, self.walls, self.backend)
+        return self._meter.measure(self.medium.mass, self.timeline.now, self.timeline.tick)
 
     @property
     def keeps_momentum_budget(self) -> bool:

@@ -89,7 +89,12 @@ class Path:
     @ti.func
     def carried(self, spin, arm):
         """Velocity [m/s] at `arm` [m] from the pivot that `spin` [rad/s] gives."""
-        return ti.Vector([-spin[0] * arm[1], spin[0] * arm[0]]) if ti.static(self.dim == 2) else spin.cross(arm)
+        v = arm
+        if ti.static(self.dim == 2):  # noqa: SIM108  (both sides of an expression would be compiled)
+            v = ti.Vector([-spin[0] * arm[1], spin[0] * arm[0]])
+        else:
+            v = spin.cross(arm)
+        return v
 
     @ti.func
     def speed_until(self, time, horizon):
