@@ -229,7 +229,7 @@ class PolygonObstacle:
     def _check(self) -> PolygonObstacle:
         x, y = np.array(self.points).T
         area = 0.5 * float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
-        if abs(area) < 1e-12 * np.ptp(x) * np.ptp(y) or len(set(self.points)) < len(self.points):
+        if abs(area) <= 1e-12 * (np.ptp(x) + np.ptp(y)) ** 2 or len(set(self.points)) < len(self.points):
             raise ValueError(f"points {self.points} enclose no area or repeat; give each corner once")
         return self
 

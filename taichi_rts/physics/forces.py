@@ -77,8 +77,8 @@ class ForceMeter:
 
     def nearest(self, arms: np.ndarray) -> np.ndarray:
         """Differences of places [m] to the nearest image along periodic axes."""
-        lengths = np.where(self.scene.is_periodic, self.scene.domain.size, np.inf)
-        return arms - np.nan_to_num(lengths * np.round(arms / lengths))
+        lengths = np.array(self.scene.domain.size)
+        return arms - np.where(self.scene.is_periodic, lengths * np.round(arms / lengths), 0.0)
 
     @ti.kernel
     def observe(self, now: ti.i32, tick: float):

@@ -19,7 +19,7 @@ class ObstaclePoints:
         self.moving = {body.number: body for body in bodies(scene)}
         self.points = []
         for k, obstacle in enumerate(scene.obstacles):
-            points = _spheres(make_solid(obstacle, scene.spacing, scene.domain), radius)
+            points = _spheres(make_solid(obstacle, scene.spacing), radius)
             if k not in self.moving:
                 low, high = np.array(scene.domain.lower) - radius, np.array(scene.domain.upper) + radius
                 points = points[((points >= low) & (points <= high)).all(axis=1)]
@@ -40,6 +40,7 @@ def _spheres(solid: Solid, radius: float) -> np.ndarray:
     """Points [m], (M, dim), a radius below the surface of a solid, in two dimensions also what it encloses."""
     points = solid.surface(OVERLAP * radius)
     points = points - radius * solid.normals(points, 0.2 * radius)
+    points = points[solid.distance(points) < -0.6 * radius]  # at sharp edges others stand already
     if points.shape[1] == 3:
         return points
     axes = [np.arange(a, b, OVERLAP * radius) for a, b in zip(solid.lower, solid.upper, strict=True)]
