@@ -14,6 +14,15 @@ from taichi_rts.errors import (
     TimeError,
 )
 from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
+from taichi_rts.obstacles import (
+    BoxObstacle,
+    ConstantMotion,
+    CylinderObstacle,
+    Keyframes,
+    MeshObstacle,
+    PolygonObstacle,
+    SphereObstacle,
+)
 from taichi_rts.output.export import Exporter, write_particles
 from taichi_rts.output.series import Series
 from taichi_rts.particle_files.formats import read_particles
@@ -34,17 +43,23 @@ __all__ = [
     "BackendError",
     "Block",
     "Box",
+    "BoxObstacle",
+    "ConstantMotion",
+    "CylinderObstacle",
     "Energy",
     "Error",
     "Exporter",
     "Gauge",
     "GravityChange",
     "Inflow",
+    "Keyframes",
     "LinearField",
+    "MeshObstacle",
     "MovingWall",
     "OutputError",
     "ParticleFrame",
     "Particles",
+    "PolygonObstacle",
     "Probe",
     "Regional",
     "RegionalSound",
@@ -55,6 +70,7 @@ __all__ = [
     "Simulation",
     "SimulationDivergedError",
     "Sphere",
+    "SphereObstacle",
     "StandingWave",
     "StepperError",
     "TaylorGreen",

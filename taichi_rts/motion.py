@@ -1,5 +1,6 @@
 """The passes that move particles: where they are at a given time, what neighbours see of them, and the corrected new state."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import taichi as ti
@@ -8,6 +9,7 @@ from taichi_rts.grid import BlockGrid
 from taichi_rts.particles import Neighbourhood, Particles
 from taichi_rts.physics.medium import Medium
 from taichi_rts.physics.momentum import MomentumEquation
+from taichi_rts.physics.moving_walls import MovingFace
 
 RUNAWAY_SPEED = 2.0
 RUNAWAY_ACCELERATION = 4.0
@@ -34,9 +36,12 @@ class Motion:
         medium: Medium,
         *,
         integrates_density: bool = False,
+        obstacles: Sequence[Any] = (),
     ) -> None:
         self.integrates_density = integrates_density
         self.moving_walls = momentum.moving
+        self.faces = [wall for wall in momentum.moving if isinstance(wall, MovingFace)]
+        self.obstacles = list(obstacles)
         self.particles = particles
         self.near = near
         self.grid = grid
@@ -48,6 +53,8 @@ class Motion:
         self.geometry = grid.geometry
         self.stopped = ti.field(ti.i32, ())
         """How often a face of the domain stopped a centre that wall particles had let through."""
+        self.stopped_by_obstacles = ti.field(ti.i32, ())
+        """How often an obstacle did."""
         self.not_finite = ti.field(ti.i32, ())
         self.runaways = ti.field(ti.i32, ())
         """How often a speed or an acceleration had to be limited: more than never means that the run has blown up."""
@@ -190,7 +197,7 @@ class Motion:
                 self.not_finite[None] += 1
             inside = self.geometry.place(x)
             v_free, v_face = v, ti.zero(v)
-            for wall in ti.static(self.moving_walls):
+            for wall in ti.static(self.faces):
                 held = wall.hold(inside, time)
                 if held[wall.axis] != inside[wall.axis]:
                     _displacement, v_face[wall.axis] = wall.motion(time)
@@ -201,6 +208,12 @@ class Motion:
                         self.stopped[None] += 1
                         if (x[d] - inside[d]) * (v[d] - v_face[d]) > 0.0:
                             v[d] = v_face[d]
+            for obstacle in ti.static(self.obstacles):
+                held, normal, v_surface = obstacle.hold(inside, time)
+                if normal.norm_sqr() > 0.0:
+                    self.stopped_by_obstacles[None] += 1
+                    inside = self.geometry.place(held)
+                    v -= ti.min((v - v_surface).dot(normal), 0.0) * normal
             if ti.static(self.particles.has_budget):
                 a_walls = a
                 for d in ti.static(range(self.particles.dim)):
@@ -237,6 +250,9 @@ class Motion:
         for i in range(self.particles.alive[None]):
             dt = self.elapsed(i, now, tick) + ahead
             position = self.position(i, dt, tick)
+            for obstacle in ti.static(self.obstacles):
+                held, _normal, _velocity = obstacle.hold(position, ti.cast(now, float) * tick + ahead)
+                position = held
             velocity = self.particles.v[i] + self.particles.a[i] * dt
             if ti.static(self.particles.has_past):
                 velocity = self.velocity(i, dt, tick)

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from taichi_rts.conditions import AXES, Inflow
+from taichi_rts.layers import line_solid, neighbours, shares
 from taichi_rts.particle_fluid import Particles
 from taichi_rts.physics.equation_of_state import Tait
 from taichi_rts.scene import Scene
 from taichi_rts.shapes import Block, Sphere, velocities
 from taichi_rts.smoothing import lattice_sum, make_kernel
+from taichi_rts.solids import Solid, make_solid
 
 CONTINUED_LATTICE = 1.0
 WALL_STIFFNESS = 4.0 / 3.0
@@ -25,6 +28,8 @@ at 47 m/s at courant 0.4 and blows up at 0.6. 4/3 settles 1.2 % too low, keeps e
 (docs/defaults.md).
 With an integrated density the walls' pressure is mirrored and 1 is right (`continuity.MirroredPressure`).
 """
+EVEN_SWEEPS = 20
+MOST_SCALED = 2.5
 
 
 @dataclass(frozen=True)
@@ -44,13 +49,23 @@ class WallLayer:
         """Return those that `mask`, (M,), names."""
         return replace(self, positions=self.positions[mask], normals=self.normals[mask], volumes=self.volumes[mask])
 
+    def joined(self, others: Sequence[WallLayer]) -> WallLayer:
+        """Return these and those of `others`, which have the same stiffness, behind them."""
+        layers = [self, *others] if len(self.positions) else list(others) or [self]
+        return replace(
+            layers[0],
+            positions=np.concatenate([layer.positions for layer in layers]),
+            normals=np.concatenate([layer.normals for layer in layers]),
+            volumes=np.concatenate([layer.volumes for layer in layers]),
+        )
+
 
 @dataclass(frozen=True)
 class Sample:
     """Particles at the start: positions [m] and velocities [m/s], (N, dim), densities [kg/m^3], viscosities [m^2/s], (N,).
 
     All have one mass [kg]. `walls` are the wall particles, (M,), and `owners`, (M,), the number of the moving wall that each
-    is part of, -1 for those at rest.
+    is part of, -1 for those at rest. `obstacles` are the wall particles of each obstacle, as it stands at time 0.
     """
 
     positions: np.ndarray
@@ -60,11 +75,13 @@ class Sample:
     mass: float
     walls: WallLayer
     owners: np.ndarray
+    obstacles: tuple[WallLayer, ...] = ()
 
 
 def sample(scene: Scene) -> Sample:
-    """Fill the scene's fluids with a lattice and line its walls."""
-    positions = [fill(scene, fluid) for fluid in scene.fluids]
+    """Fill the scene's fluids with a lattice, but not where obstacles are, and line its walls and obstacles."""
+    solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
+    positions = [keep_outside(scene, solids, fill(scene, fluid)) for fluid in scene.fluids]
     moving = [velocities(fluid, x) for fluid, x in zip(scene.fluids, positions, strict=True)]
     pressed = [compress(scene, fluid, x) for fluid, x in zip(scene.fluids, positions, strict=True)]
     viscosities = [np.full(len(x), nu) for x, nu in zip(positions, scene.viscosities, strict=False)]
@@ -75,6 +92,7 @@ def sample(scene: Scene) -> Sample:
         np.concatenate(viscosities),
         calibrate_mass(scene),
         *line_walls(scene),
+        line_obstacles(scene, solids),
     )
 
 
@@ -198,6 +216,53 @@ def line_walls(scene: Scene) -> tuple[WallLayer, np.ndarray]:
     return layer.choose(~behind_patches), np.concatenate(owners)[~behind_patches]
 
 
+def keep_outside(scene: Scene, solids: Sequence[Solid], x: np.ndarray) -> np.ndarray:
+    """Leave out of `x` [m], (N, dim), what lies in an obstacle or nearer to it than half a spacing, as at the walls."""
+    for solid in solids:
+        x = x[solid.distance(x) >= (0.5 - 1e-3) * scene.spacing]
+    return x
+
+
+def line_obstacles(scene: Scene, solids: Sequence[Solid]) -> tuple[WallLayer, ...]:
+    """One layer of wall particles below the surface of each obstacle: at the depth and with the volume of `calibrate_walls`.
+
+    Where they are closer than in the domain's walls, or further apart, their volumes are less, or more (`layers.shares`), and
+    where the surface bends or the body is thin, such that fluid half a spacing away sees as much as at a plane wall. Those of
+    obstacles at rest are left out where the domain ends and inside other obstacles at rest, which have their own.
+    """
+    depth, volume = calibrate_walls(scene) if solids else (0.0, 0.0)
+    kernel = make_kernel(scene.kernel, scene.dim, scene.support)
+    seen = volume * plane_sum(scene)(0.5 * scene.spacing + depth)
+    at_rest = [obstacle.motion is None for obstacle in scene.obstacles]
+    layers = []
+    for k, solid in enumerate(solids):
+        x, normals = line_solid(solid, depth, scene.spacing)
+        probes = x + (0.5 * scene.spacing - solid.distance(x))[:, None] * normals
+        volumes = even_out(kernel, x, volume * shares(x, scene.spacing), probes, seen)
+        if at_rest[k]:
+            kept = ((x >= scene.domain.lower) & (x <= scene.domain.upper)).all(axis=1)
+            for other, its in zip(solids[:k], at_rest, strict=False):
+                if its:
+                    kept &= other.distance(x) > -0.99 * depth
+            x, volumes, normals = x[kept], volumes[kept], normals[kept]
+        layers.append(WallLayer(x, normals, volumes, depth, wall_stiffness(scene)))
+    return tuple(layers)
+
+
+def even_out(kernel: Any, x: np.ndarray, volumes: np.ndarray, probes: np.ndarray, seen: float) -> np.ndarray:
+    """Volumes [m^dim], (M,), for which the sum of V_b W at each of the `probes`, (M, dim), above the particles is `seen`.
+
+    Found by scaling each by what its probe lacks, again and again, and never by more than `MOST_SCALED` in all.
+    """
+    near = neighbours(x, probes, 2.0 * kernel.h)
+    weights = [kernel.sample(np.linalg.norm(x[n] - y, axis=1)) for n, y in zip(near, probes, strict=True)]
+    scaled = volumes
+    for _ in range(EVEN_SWEEPS):
+        found = np.array([w @ scaled[n] for n, w in zip(near, weights, strict=True)])
+        scaled = np.clip(scaled * (seen / found) ** 0.7, volumes / MOST_SCALED, volumes * MOST_SCALED)
+    return scaled
+
+
 def wall_stiffness(scene: Scene) -> float:
     """How much steeper the walls' density profile is than the lattice's, for the scene's formulation of density."""
     return CONTINUED_LATTICE if scene.density == "continuity" else WALL_STIFFNESS
@@ -214,10 +279,7 @@ def calibrate_walls(scene: Scene) -> tuple[float, float]:
     s, dim, r = scene.spacing, scene.dim, scene.support
     kernel = make_kernel(scene.kernel, dim, r)
     reach = math.ceil(scene.support_ratio)
-    lateral2 = sum(g**2 for g in np.meshgrid(*[s * np.arange(-reach, reach + 1)] * (dim - 1)))
-
-    def plane(d: float) -> float:
-        return float(kernel.sample(np.sqrt(lateral2 + d * d)).sum())
+    plane = plane_sum(scene)
 
     def slope(function: Callable[[float], float], d: float) -> float:
         step = 1e-4 * s
@@ -232,6 +294,15 @@ def calibrate_walls(scene: Scene) -> tuple[float, float]:
         middle = 0.5 * (near + far)
         near, far = (middle, far) if slope(plane, middle) / plane(middle) > wanted else (near, middle)
     return near - 0.5 * s, missing(s) / (plane(near) * lattice_sum(kernel, dim, s))
+
+
+def plane_sum(scene: Scene) -> Callable[[float], float]:
+    """Return S(d): the sum of W over a plane of a lattice of the scene's spacing at distance d [m]."""
+    kernel = make_kernel(scene.kernel, scene.dim, scene.support)
+    reach = math.ceil(scene.support_ratio)
+    steps = scene.spacing * np.arange(-reach, reach + 1)
+    lateral2 = sum(g**2 for g in np.meshgrid(*[steps] * (scene.dim - 1)))
+    return lambda d: float(kernel.sample(np.sqrt(lateral2 + d * d)).sum())
 
 
 def _product(axes: list[np.ndarray]) -> np.ndarray:

@@ -17,9 +17,11 @@ from annotated_types import Len
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from taichi_rts.bodies import bodies
 from taichi_rts.conditions import AXES, Axis, GravityChange, Inflow, MovingWall
 from taichi_rts.errors import SceneError
 from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
+from taichi_rts.obstacles import SHAPES, ConstantMotion, Keyframes, Obstacle
 from taichi_rts.particle_fluid import Particles
 from taichi_rts.probes import Gauge, Probe
 from taichi_rts.scene_checks import contradictions
@@ -79,6 +81,7 @@ class Scene:
         inflows: patches of the domain's faces through which fluid enters.
         probes: points where a run's time series has the pressure.
         gauges: lines along gravity on which it has the water's height.
+        obstacles: rigid bodies, at rest or moving as prescribed (`taichi_rts.obstacles`); fluid inside them is left out.
         end_time: how long the scene is worth watching [s].
         view: where pictures are taken from.
 
@@ -106,6 +109,7 @@ class Scene:
     inflows: tuple[Inflow, ...] = ()
     probes: tuple[Probe, ...] = ()
     gauges: tuple[Gauge, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
     end_time: Positive = 1.0
     view: View = Field(default_factory=View)
     name: str = "scene"
@@ -224,14 +228,18 @@ class Scene:
             for fluid in self.fluids
         )
 
+    @property
+    def wall_speed(self) -> float:
+        """Largest speed [m/s] of a moving wall or of a point of a moving obstacle."""
+        return max([0.0, *(wall.top_speed for wall in self.moving_walls), *(body.top_speed for body in bodies(self))])
+
     def estimate_max_speed(self) -> float:
         """Largest speed [m/s] any fluid can reach by falling from where it is: max of sqrt(|v|^2 + 2 g H).
 
         H [m] is the height of a fluid's top above the lowest corner of the domain, along gravity, |v| the largest speed in
-        its bounding box, or of an inflow, or of a moving wall. After a change of gravity fluid may fall through all of the
-        domain; along a periodic axis it falls once around. A body force is left out.
+        its bounding box, or of an inflow, a moving wall or an obstacle. After a change of gravity fluid may fall through all
+        of the domain; along a periodic axis it falls once around. A body force is left out.
         """
-        walls = [wall.top_speed for wall in self.moving_walls]
         uphill = tuple(-a for a in self.acceleration)
         starts = [(top_speed(fluid), fluid.reach(uphill)) for fluid in self.fluids]
         starts += [(math.hypot(*inflow.velocity), inflow.reach(uphill)) for inflow in self.inflows]
@@ -241,7 +249,7 @@ class Scene:
             falls.append(
                 (top, sum(abs(g) * length for g, length in zip(change.gravity, self.domain.size, strict=False)))
             )
-        return max(*walls, *(math.sqrt(speed**2 + 2.0 * fall) for speed, fall in falls), 0.0)
+        return max(self.wall_speed, *(math.sqrt(speed**2 + 2.0 * fall) for speed, fall in falls))
 
     @property
     def floor_potential(self) -> float:
@@ -290,6 +298,9 @@ _PARTS = (
     Gauge,
     View,
     RegionalSound,
+    *SHAPES.values(),
+    ConstantMotion,
+    Keyframes,
 )
 _KEYS = [key for cls in _PARTS for key in cls.__dataclass_fields__]  # type: ignore[attr-defined]
 
@@ -313,8 +324,7 @@ def load_scene(name: str | Path, *, particles: float | str | None = None, **chan
         raise SceneError(f"scene file {str(path)!r} cannot be read: {error.strerror}; check the path") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise SceneError(f"scene file {str(path)!r} is not valid TOML: {error}") from None
-    data = {"name": path.stem} | data
-    _resolve_files(data, path)
+    data = with_files_beside({"name": path.stem} | data, path)
     if particles is not None:
         if "spacing" in changes:
             raise SceneError(f"particles {particles!r} and spacing {changes['spacing']!r} are both given; give one")
@@ -322,18 +332,28 @@ def load_scene(name: str | Path, *, particles: float | str | None = None, **chan
     return scene_from(data | changes, str(path))
 
 
-def _resolve_files(data: dict[str, Any], path: Path) -> None:
-    """Let the particle files that the scene in `path` names begin at its folder, which they may not leave."""
-    folder, fluids = path.parent.resolve(), data.get("fluids")
-    for k, fluid in enumerate(fluids if isinstance(fluids, list) else []):
-        if isinstance(fluid, dict) and isinstance(fluid.get("file"), str):
-            file = (folder / fluid["file"]).resolve()
-            if not file.is_relative_to(folder):
-                raise SceneError(
-                    f"{path}: fluids.{k}.file: {fluid['file']!r} leaves the scene's folder {folder}; "
-                    "put the particles or the scene elsewhere"
-                )
-            fluid["file"] = str(file)
+def with_files_beside(data: dict[str, Any], path: Path) -> dict[str, Any]:
+    """Return the data of the scene file `path` with the files of its particles and meshes relative to its folder.
+
+    Raises `SceneError` for a file outside that folder.
+    """
+    folder = path.resolve().parent
+    resolved: dict[str, Any] = {}
+    for key in ("fluids", "obstacles"):
+        parts = data.get(key)
+        if not isinstance(parts, list):
+            continue
+        resolved[key] = []
+        for k, part in enumerate(parts):
+            if isinstance(part, dict) and isinstance(part.get("file"), str):
+                file = (folder / part["file"]).resolve()
+                if not file.is_relative_to(folder):
+                    raise SceneError(
+                        f"{path}: {key}.{k}.file: {part['file']!r} leaves the scene's folder {str(folder)!r}; put it there"
+                    )
+                part = part | {"file": str(file)}
+            resolved[key].append(part)
+    return data | resolved
 
 
 def scene_from(data: dict[str, Any], source: str = "scene") -> Scene:

@@ -8,6 +8,7 @@ import numpy as np
 
 from taichi_rts.conditions import AXES, face_axis, face_position
 from taichi_rts.neighbours import mean_occupancy, nearest_pair
+from taichi_rts.obstacle_checks import obstacle_faults
 from taichi_rts.particle_fluid import LEAST_DISTANCE, Particles
 from taichi_rts.probes import names
 from taichi_rts.shapes import Block, Sphere, separation
@@ -39,6 +40,7 @@ def contradictions(scene: Scene) -> list[str]:
                 faults += _pair_faults(scene, k, other)
     if not faults:
         faults += _particle_faults(scene)
+    faults += obstacle_faults(scene)
     if not faults and _guesses_speed(scene) and scene.estimate_max_speed() <= 0.0:
         faults.append("sound_speed: nothing falls or moves at the start, so no default follows; give it a value [m/s]")
     return faults

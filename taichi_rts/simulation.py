@@ -12,6 +12,7 @@ import taichi as ti
 from PIL import Image
 
 from taichi_rts import backend as backends
+from taichi_rts.bodies import bodies
 from taichi_rts.diagnostics import Energy, Overhead, Tally, measure_energy
 from taichi_rts.errors import Error, SimulationDivergedError, TimeError
 from taichi_rts.frames import frame_times
@@ -22,14 +23,17 @@ from taichi_rts.particles import Neighbourhood, Particles
 from taichi_rts.physics.continuity import ContinuityDensity, DensityDiffusion, MirroredPressure
 from taichi_rts.physics.density import SummationDensity
 from taichi_rts.physics.floating_reference import FloatingReference
+from taichi_rts.physics.forces import ForceMeter, ObstacleForces
 from taichi_rts.physics.medium import Medium
 from taichi_rts.physics.momentum import Gravity, MomentumEquation, Pressure
 from taichi_rts.physics.moving_walls import MovingFace
+from taichi_rts.physics.obstacles import Keeper, MovingBody
 from taichi_rts.physics.sound_rule import SoundRule
 from taichi_rts.physics.viscosity import viscosity_terms
 from taichi_rts.physics.walls import Walls
 from taichi_rts.sampling import Sample, sample
 from taichi_rts.scene import Scene
+from taichi_rts.solids import distance_grid, make_solid
 from taichi_rts.stepping.base import Stepper
 from taichi_rts.stepping.regional import Regional
 
@@ -42,14 +46,29 @@ DENSITIES: dict[str, Any] = {"summation": SummationDensity, "continuity": Contin
 
 
 def make_walls(
-    scene: Scene, start: Sample, near: Neighbourhood, geometry: Geometry, backend: backends.Backend
+    scene: Scene, start: Sample, near: Neighbourhood, grid: BlockGrid, backend: backends.Backend
 ) -> list[Any]:
-    """Return the walls at rest, if there are any, and each moving face."""
+    """Return the walls and obstacles at rest as one, if there are any, and each moving face and obstacle."""
+    geometry, moving_bodies = grid.geometry, bodies(scene)
+    at_rest = [layer for layer, body in zip(start.obstacles, scene.obstacles, strict=True) if body.motion is None]
     layers = [start.walls.choose(start.owners == number) for number in range(len(scene.moving_walls))]
     rest = start.walls.choose(start.owners == -1)
+    if at_rest:
+        rest = rest.joined(at_rest)
     still: list[Any] = [Walls(rest, near, geometry, backend)] if len(rest.positions) else []
     moving = zip(scene.moving_walls, layers, strict=True)
-    return still + [MovingFace(wall, layer, near, geometry, backend) for wall, layer in moving]
+    faces = [MovingFace(wall, layer, near, geometry, backend) for wall, layer in moving]
+    turning = [
+        MovingBody(body, start.obstacles[body.number], near, grid, scene.support, backend) for body in moving_bodies
+    ]
+    return still + faces + turning
+
+
+def make_keepers(scene: Scene, geometry: Geometry) -> list[Keeper]:
+    """Return what keeps centres out of each obstacle."""
+    moving = {body.number: body for body in bodies(scene)}
+    solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
+    return [Keeper(distance_grid(solid, scene.spacing), geometry, moving.get(k)) for k, solid in enumerate(solids)]
 
 
 class Simulation:
@@ -95,7 +114,9 @@ class Simulation:
             law = FloatingReference(self.medium.equation_of_state, self.particles, self.sound)
             self.medium = dataclasses.replace(self.medium, equation_of_state=law)
         self.near = Neighbourhood(capacity, scene.dim, backend, needs)
-        self.walls = make_walls(scene, start, self.near, geometry, backend)
+        self._obstacle_layers = start.obstacles
+        self._meter: ForceMeter | None = None
+        self.walls = make_walls(scene, start, self.near, self.grid, backend)
         self.density = density(self.particles, self.near, self.grid, self.walls, self.medium, backend)
         gravity = Gravity(scene)
         pressure = MirroredPressure(self.near, scene) if density.integrates else Pressure(self.near)
@@ -118,6 +139,7 @@ class Simulation:
             self.stepper.make_integrator(),
             self.medium,
             integrates_density=density.integrates,
+            obstacles=make_keepers(scene, geometry),
         )
         self.schedule = self.stepper.schedule(scene, self.particles, self.grid, self.timeline)
         self.schedule.debug = debug
@@ -314,13 +336,15 @@ class Simulation:
         """Work so far: base_steps, particle_updates, wall_seconds, active_fraction, level_fractions and more.
 
         `overhead_fraction` is the share of a step in which all are due that everybody pays (grid, regions, prediction),
-        measured on a sample of the steps. `stopped_by_domain` counts centres that a face of the domain had to stop, `runaways`
-        speeds and accelerations that had to be limited because the run has blown up.
+        measured on a sample of the steps. `stopped_by_domain` and `stopped_by_obstacles` count centres that a face of the
+        domain or an obstacle had to stop, `runaways` speeds and accelerations that had to be limited because the run has blown
+        up.
         """
         return {
             **self._tally.statistics(),
             "overhead_fraction": self.overhead.fraction,
             "stopped_by_domain": int(self.motion.stopped[None]),
+            "stopped_by_obstacles": int(self.motion.stopped_by_obstacles[None]),
             "runaways": int(self.motion.runaways[None]),
             **self.schedule.statistics(),
         }
@@ -333,18 +357,18 @@ class Simulation:
     @property
     def keeps_work(self) -> bool:
         """Whether `work` is known."""
-        return self.particles.has_budget or not (self.scene.moving_walls or self.scene.inflows)
+        return self.particles.has_budget or not (self.motion.moving_walls or self.inflows)
 
     def work(self) -> float:
-        """Energy [J] that changes of gravity, moving walls and inflows have put in until `time`.
+        """Energy [J] that changes of gravity, moving walls, moving obstacles and inflows have put in until `time`.
 
-        What flows in brings its kinetic and potential energy. Moving walls and inflows need a debug run, else raises `Error`.
+        What flows in brings its kinetic and potential energy. All but gravity need a debug run, else raises `Error`.
         """
         total = self._gravity_work
         p = self.particles
-        if self.scene.moving_walls or self.inflows:
+        if self.motion.moving_walls or self.inflows:
             if not self.keeps_work:
-                raise Error("the work of moving walls and inflows needs Simulation(..., debug=True)")
+                raise Error("the work of moving walls, moving obstacles and inflows needs Simulation(..., debug=True)")
             elapsed = self._time - p.to_numpy(p.updated) * self.timeline.tick
             done = p.to_numpy(p.work).astype(float) + elapsed * p.to_numpy(p.power)
             total += self.medium.mass * float(done.sum()) + (self.inflows.energy if self.inflows else 0.0)
@@ -364,6 +388,17 @@ class Simulation:
     def momentum(self) -> np.ndarray:
         """Total momentum [kg m/s], (dim,), at `time`."""
         return self.medium.mass * self.velocities().astype(np.float64).sum(axis=0)
+
+    def obstacle_forces(self) -> ObstacleForces:
+        """Forces [N] and torques [N m] of the fluid on each obstacle, in the scene's order, at the last step up to `time`.
+
+        The first call compiles; asking changes nothing in the run. Raises `Error` for a scene without obstacles.
+        """
+        if not self.scene.obstacles:
+            raise Error(f"scene {self.scene.name!r} has 0 obstacles, so no force acts on one; give it at least 1")
+        if self._meter is None:
+            self._meter = ForceMeter(self.scene, self.motion, self._obstacle_layers, self.walls, self.backend)
+        return self._meter.measure(self.medium.mass, self.timeline.now, self.timeline.tick)
 
     @property
     def keeps_momentum_budget(self) -> bool:

@@ -150,6 +150,7 @@ class MomentumEquation:
 
             return pair
 
+        self.wall_pair = wall_pair
         self.moving = [wall for wall in walls if wall.moves]
         self.sum_fluid = make_neighbour_sum(geometry, grid.start, fluid_pair, width, backend)
         self.wall_rates = make_wall_sum(walls, grid, wall_pair, width, backend)

@@ -125,7 +125,7 @@ class SoundRule:
         acceleration2, viscosity = 0.0, self.common_viscosity
         if first < end:
             p = self.particles
-            speed2, pressure = self.maxima.wall_speed2(block), 0.0
+            speed2, pressure = self.maxima.wall_speed2(block, now, tick), 0.0
             for k in range(first, end):
                 i = self.grid.order[k]
                 a = p.a[i]

@@ -70,7 +70,7 @@ class LaminarViscosity:
     def wall_pair(self, i, b, x_ib, v_ib, d2, wall: ti.template()):
         """The same against a wall, which has the particle's density and viscosity, with no slip on its face."""
         scale = 2.0 * self.nu_between(i, i) * d2 / (self.near.rho[i] * (d2 + self.regular))
-        return scale * wall.shear(b, x_ib) * v_ib
+        return scale * wall.shear(i, b, x_ib) * v_ib
 
 
 def viscosity_terms(scene: Scene, medium: Medium, near: Neighbourhood) -> list[Any]:

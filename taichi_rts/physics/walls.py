@@ -71,14 +71,19 @@ class Walls:
         return self.fluid.v[k]
 
     @ti.func
-    def shear(self, b, x_ib):
+    def facing(self, k, b):
+        """Normal of wall particle `b`, for the fluid at place `k`."""
+        return self.normal[b]
+
+    @ti.func
+    def shear(self, k, b, x_ib):
         """How much faster than fluid at x_ib [m] from particle `b` that fluid moves past the wall's far side, per its speed.
 
         With (d_i + d_b)/d_i, d_i and d_b being the distances to the face, velocities go through zero on the face (Morris, Fox &
         Zhu 1997, Eq. 23), and a linear profile along a resting lattice feels no force, as it should. Bounded, because fluid
         may come arbitrarily close.
         """
-        distance = self.normal[b].dot(x_ib)
+        distance = self.facing(k, b).dot(x_ib)
         return ti.min(distance / ti.max(distance - self.depth, 1e-3 * self.depth), LARGEST_SHEAR) / self.stiffness
 
 
@@ -90,7 +95,7 @@ def make_wall_sum(
     `make_pair(wall)` returns the ti.func `pair(k, b)`, a vector of `width`, as `make_neighbour_sum` takes it.
     """
     walls = list(walls)
-    sums = [make_neighbour_sum(grid.geometry, wall.start, make_pair(wall), width, backend) for wall in walls]
+    sums = [make_neighbour_sum(wall.geometry, wall.start, make_pair(wall), width, backend) for wall in walls]
 
     @ti.func
     def sum_walls(k):

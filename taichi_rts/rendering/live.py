@@ -35,6 +35,7 @@ def watch(scene: Scene, stepper: Any, options: PictureOptions, start: Callable[[
             f"active {statistics['active_fraction']:.1%}",
             f"{sim.count:,} particles",
         ]
-        window.draw(x, painter.colours(sim, v, rho, level), 0.5 * scene.spacing, camera, outline, lines)
+        x, tints = painter.obstacles.add(x, painter.colours(sim, v, rho, level), sim.time)
+        window.draw(x, tints, 0.5 * scene.spacing, camera, outline, lines)
     window.close()
     return sim

@@ -10,6 +10,7 @@ import numpy as np
 
 from taichi_rts.rendering import colours, legend
 from taichi_rts.rendering.camera import Camera
+from taichi_rts.rendering.obstacles import ObstaclePoints
 from taichi_rts.rendering.splatter import Splatter
 from taichi_rts.scene import Scene
 from taichi_rts.simulation import Simulation
@@ -66,6 +67,7 @@ class Painter:
         self.title = title
         self.renderer = renderer if renderer is not None else make_renderer(options)
         self.camera = make_camera(scene, options)
+        self.obstacles = ObstaclePoints(scene, 0.5 * scene.spacing)
         self.top_speed = scene.estimate_max_speed()
 
     def paint(self, sim: Simulation) -> np.ndarray:
@@ -73,6 +75,7 @@ class Painter:
         x, v, rho, level = sim.state()
         tints = self.colours(sim, v, rho, level)
         outline = (self.scene.domain.lower, self.scene.domain.upper)
+        x, tints = self.obstacles.add(x, tints, sim.time)
         image = self.renderer.draw(x, tints, 0.5 * self.scene.spacing, self.camera, outline)
         return self._label(image, sim, level) if self.options.legend else image
 

@@ -74,7 +74,7 @@ def impact_speed(scene: Scene) -> float:
 
 def wall_speed(scene: Scene) -> float:
     """Largest speed [m/s] of a moving face of the domain."""
-    return max((wall.top_speed for wall in scene.moving_walls), default=0.0)
+    return scene.wall_speed
 
 
 def gravities(scene: Scene) -> Iterator[tuple[float, ...]]:

@@ -94,7 +94,7 @@ def watch(
     default a new one. Works in any precision, on the backend that was initialised last. Steps do not depend on when it looks.
     """
     demanded = demands.demanded_density(scene) if demanded_density is None else demanded_density
-    moving = bool(scene.moving_walls or scene.inflows)
+    moving = bool(scene.wall_speed or scene.inflows)
     sim = (build or Simulation)(scene, stepper, debug=moving)  # only then is their work added up
     watcher = _Watcher(sim, demanded, ENERGY_MARGIN if times is None else 2.0 * ENERGY_MARGIN)
     end = scene.end_time if end_time is None else end_time

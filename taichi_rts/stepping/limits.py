@@ -1,10 +1,14 @@
 """What limits the step of a block: the largest speed, acceleration, viscosity and density of its particles and walls nearby."""
 
+import math
+
 import taichi as ti
 
+from taichi_rts.bodies import bodies
 from taichi_rts.conditions import face_axis, face_position
 from taichi_rts.grid import MARGIN, BlockGrid
 from taichi_rts.particles import Particles
+from taichi_rts.physics.obstacles import Path
 from taichi_rts.scene import Scene
 
 
@@ -24,6 +28,10 @@ class BlockMaxima:
             for face in [face_position(wall.face, scene.domain)]
         ]
         """Axis, range of places [m] and largest speed [m/s] of each moving face."""
+        self.paths = [Path(body) for body in bodies(scene)]
+        self.horizon = scene.support / scene.least_wave_speed  # [s]: more than any step
+        self.margin = 0.5 * math.hypot(*self.geometry.sides) + max(self.geometry.sides)
+        """Half a block's diagonal and a block [m]: how far the middle of one may be from a body that its fluid meets."""
 
     @ti.func
     def of(self, block, now, tick):
@@ -45,18 +53,28 @@ class BlockMaxima:
                 viscosity = ti.max(viscosity, self.particles.viscosity[i])
         if ti.static(not self.particles.has_viscosity):
             viscosity = self.viscosity
-        speed2 = ti.max(speed2, self.wall_speed2(block))
+        speed2 = ti.max(speed2, self.wall_speed2(block, now, tick))
         return speed2, acceleration2, viscosity, density / self.rest_density
 
     @ti.func
-    def wall_speed2(self, block):
-        """Square of the largest speed [m^2/s^2] of the moving faces that the block may meet."""
+    def wall_speed2(self, block, now, tick):
+        """Square of the largest speed [m^2/s^2] of the moving faces and obstacles that the block may meet from tick `now` on."""
         speed2 = 0.0
         for wall in ti.static(self.walls):
             low = self.lower(block, wall[0])
             if wall[1] < low + ti.static(2.0 * self.geometry.sides[wall[0]]):
                 if low - ti.static(self.geometry.sides[wall[0]]) < wall[2]:
                     speed2 = ti.max(speed2, wall[3] * wall[3])
+        for path in ti.static(self.paths):
+            time = ti.cast(now, float) * tick
+            speed = path.speed_until(time, self.horizon)
+            pivot, _turn = path.pose(time)
+            middle = ti.zero(pivot)
+            for d in ti.static(range(self.geometry.dim)):
+                middle[d] = self.lower(block, d) + 0.5 * self.geometry.sides[d]
+            reach = path.radius + speed * self.horizon + self.margin
+            if self.geometry.difference(middle, pivot).norm_sqr() < reach * reach:
+                speed2 = ti.max(speed2, speed * speed)
         return speed2
 
     @ti.func

@@ -97,6 +97,7 @@ class AdaptiveSchedule(UniformSchedule):
         self.base_ticks = round(SUBDIVISIONS * scene.wave_speed / scene.least_wave_speed)
         self.least_sound_speed = scene.least_wave_speed
         self.rest_density = scene.rest_density
+        self.wall_signal = scene.wave_speed + scene.wall_speed if scene.wall_speed else 0.0
         self.signal = ti.field(float, ())
         self.acceleration2 = ti.field(float, ())
 
@@ -125,10 +126,9 @@ class AdaptiveSchedule(UniformSchedule):
     def next_ticks(self) -> int:
         """Ticks of the next step: the smallest of Eq. 1 with c + |v|, Eq. 2 and the fixed step."""
         signal, acceleration = self.signal[None], math.sqrt(self.acceleration2[None])
-        walls = [self.scene.wave_speed + wall.top_speed for wall in self.scene.moving_walls]
         support = self.scene.support
         step = min(
-            criteria.acoustic_step(self.stepper.courant, support, max([signal, *walls])),
+            criteria.acoustic_step(self.stepper.courant, support, max(signal, self.wall_signal)),
             criteria.force_step(self.stepper.lambda_f, support, acceleration),
         )
         return max(1, min(self.base_ticks, math.floor(step / self.tick))) if math.isfinite(step) else 1

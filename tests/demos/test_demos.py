@@ -11,6 +11,7 @@ import pytest
 DEMOS = sorted((Path(__file__).parents[2] / "demos").glob("*.py"))
 COARSE = {
     "martin_moyce": 0.0127,
+    "dam_break_obstacle": 0.06,
     "free_fall": 0.1,
     "still_pool": 0.1,
     "dam_break_2d": 0.05,

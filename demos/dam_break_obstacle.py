@@ -1,0 +1,12 @@
+"""A column of water collapses and hits a tall square column.
+
+Takes every option of `taichi-rts run`, e.g. --arch cuda --particles 300k --stepper uniform.
+"""
+
+from taichi_rts.cli import run_demo
+
+SCENE = "dam_break_obstacle"
+EXPORT_FPS = 60.0  # frames per second of physical time
+
+if __name__ == "__main__":
+    run_demo(SCENE, export_fps=EXPORT_FPS)
