@@ -132,7 +132,7 @@ def test_blocks_know_the_speed_of_a_body_before_it_arrives(simulate, unstarted):
 
 def test_nobody_gets_into_meshes_or_a_paddle_in_a_dam_break(simulate):
     trimesh = pytest.importorskip("trimesh")
-    scene = rts.load_scene(MESHES / "dam_break_meshes.toml", spacing=0.06)
+    scene = rts.load_scene(MESHES / "dam_break_meshes.toml", spacing=0.05)
     paddle = rts.BoxObstacle((0.9, 0.15, 0.2), (1.1, 0.25, 0.4), motion=scene.obstacles[2].motion)
     scene = scene.replace(obstacles=(*scene.obstacles[:2], paddle), fluids=(rts.Block((0, 0, 0), (0.4, 0.6, 0.6)),))
     meshes = [trimesh.load_mesh(obstacle.file) for obstacle in scene.obstacles[:2]]
