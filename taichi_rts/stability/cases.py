@@ -122,11 +122,10 @@ def jet_into_corner() -> Scene:
 
 
 def drop_in_gap() -> Scene:
-    """A drop falls through a channel 3 particles wide and lands in it.
-
-    TODO: a gap between two obstacles, once scenes have obstacles; until then the tank itself is the gap.
-    """
-    return tank(3 * S, 1.6, rts.Block((0, 1.0), (3 * S, 1.4)), sound_speed=53.0, end_time=0.8)
+    """A drop falls on two shelves with a gap 3 particles wide between them, and through it to the floor."""
+    edge = 0.5 - 1.5 * S
+    shelves = rts.BoxObstacle((0, 0.6), (edge, 0.8)), rts.BoxObstacle((1 - edge, 0.6), (1, 0.8))
+    return tank(1, 1.6, rts.Block((0.3, 1.0), (0.7, 1.4)), sound_speed=53.0, obstacles=shelves, end_time=0.8)
 
 
 def viscous_blob() -> Scene:
