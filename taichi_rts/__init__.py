@@ -5,6 +5,7 @@ from taichi_rts.conditions import GravityChange, Inflow, MovingWall
 from taichi_rts.diagnostics import Energy
 from taichi_rts.errors import (
     BackendError,
+    CheckpointError,
     Error,
     OutputError,
     RenderError,
@@ -14,6 +15,7 @@ from taichi_rts.errors import (
     TimeError,
 )
 from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
+from taichi_rts.output.checkpoint import load_checkpoint, save_checkpoint
 from taichi_rts.scene import Scene, View, load_scene, scene_names
 from taichi_rts.shapes import Block, Box, Sphere
 from taichi_rts.simulation import Simulation
@@ -28,6 +30,7 @@ __all__ = [
     "BackendError",
     "Block",
     "Box",
+    "CheckpointError",
     "Energy",
     "Error",
     "GravityChange",
@@ -50,6 +53,8 @@ __all__ = [
     "Uniform",
     "View",
     "init",
+    "load_checkpoint",
     "load_scene",
+    "save_checkpoint",
     "scene_names",
 ]

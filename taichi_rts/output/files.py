@@ -6,9 +6,9 @@ import contextlib
 import json
 import os
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from taichi_rts.errors import OutputError
 
@@ -17,20 +17,32 @@ ARTEFACTS = ("frames", "run.json", "video.mp4")  # what a run writes, and all th
 
 def write_bytes(path: Path, data: bytes) -> None:
     """Write `data` to `path` in one go; raises `OutputError`, and then leaves what was there as it was."""
-    temporary = path.with_name(f".{path.name}.part")
+    with replacing(path) as file:
+        file.write(data)
+
+
+@contextlib.contextmanager
+def replacing(path: Path, temporary: Path | None = None) -> Iterator[BinaryIO]:
+    """Give a file to write and read that takes the place of `path` when all is well; until then it is at `temporary`.
+
+    Raises `OutputError` if it cannot be written, and then leaves what was there as it was.
+    """
+    if temporary is None:
+        temporary = path.with_name(f".{path.name}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("wb") as file:
-            file.write(data)
+        with temporary.open("w+b") as file:
+            yield file
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)
     except OSError as error:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
         raise OutputError(
             f"{path} cannot be written: {error.strerror}; free some space or choose another --output-dir"
         ) from None
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
 
 
 def write_json(path: Path, data: Any) -> None:
