@@ -159,8 +159,9 @@ class Checkpoint:
 
 
 def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> str:
-    """Say in which keys two plain descriptions differ, and how; empty if they do not."""
+    """Say in which keys two plain descriptions differ, and how; of things of two names only that. Empty if they do not."""
     keys = [key for key in dict.fromkeys([*there, *here]) if there.get(key) != here.get(key)]
+    keys = ["name"] if "name" in keys else keys
     return ", ".join(f"{key} {_short(there.get(key))} there and {_short(here.get(key))} here" for key in keys)
 
 

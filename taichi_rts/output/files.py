@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 
 from taichi_rts.errors import OutputError
 
-ARTEFACTS = ("frames", "run.json", "video.mp4")  # what a run writes, and all that --overwrite removes
+ARTEFACTS = ("frames", "run.json", "video.mp4", "checkpoints")  # what a run writes, and all that --overwrite removes
 
 
 def write_bytes(path: Path, data: bytes) -> None:
@@ -50,14 +50,23 @@ def write_json(path: Path, data: Any) -> None:
     write_bytes(path, (json.dumps(data, indent=2, allow_nan=False) + "\n").encode())
 
 
-def prepare_folder(folder: Path, overwrite: bool) -> None:
+def prepare_folder(folder: Path, overwrite: bool, resumed: Path | None = None) -> None:
     """Make `folder` ready for a run: new, empty, or with an earlier run's files removed if `overwrite`.
 
     Raises `OutputError` if it holds an earlier run and `overwrite` is off, is a file, or cannot be written to. Files that
-    no run wrote are never touched.
+    no run wrote are never touched. A run that goes on in the folder of the checkpoint `resumed` keeps all that is there; nor is
+    that file ever removed from elsewhere.
     """
     require_folder(folder)
     found = [name for name in ARTEFACTS if (folder / name).exists()]
+    if resumed is not None:
+        if resumed.resolve().parent == (folder / "checkpoints").resolve():
+            require_writable(folder)
+            remove(folder, [path.relative_to(folder).as_posix() for path in folder.glob("frames/.*.part")])
+            return
+        places = (resumed.resolve(), *resumed.resolve().parents)
+        if overwrite and any((folder / name).resolve() in places for name in found):
+            raise OutputError(f"{resumed} lies in what {folder} would be cleared of; choose another --output-dir")
     if found and not overwrite:
         raise OutputError(
             f"{folder} already holds a run ({', '.join(found)}); choose another --output-dir, or give --overwrite"

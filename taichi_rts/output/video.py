@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +32,24 @@ class Video:
 
     def append(self, image: np.ndarray) -> None:
         """Add one frame; odd sides are cropped by a pixel, as the codec needs even ones."""
-        self.writer.append_data(image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2])
+        try:
+            self.writer.append_data(image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2])
+        except (OSError, ValueError) as error:
+            reason = str(error).splitlines()[0]
+            raise OutputError(
+                f"{self.path} cannot be written: {reason}; free some space, or leave out --video"
+            ) from None
 
     def close(self) -> None:
         """Finish the file and give it its name."""
         self.writer.close()
-        self.temporary.replace(self.path)
+        try:
+            self.temporary.replace(self.path)
+        except FileNotFoundError:
+            warnings.warn(f"{self.path} is lost: {self.temporary} was deleted; the frames are whole", stacklevel=2)
+
+    def drop(self) -> None:
+        """Leave it unfinished."""
+        with contextlib.suppress(OSError):
+            self.writer.close()
+        self.temporary.unlink(missing_ok=True)
