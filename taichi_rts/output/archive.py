@@ -91,10 +91,12 @@ class Archive:
 def open_archive(path: Path) -> Iterator[Archive]:
     """Open a file and check that it is a whole archive; raises `CheckpointError`."""
     try:
-        with path.open("rb") as file:
-            yield Archive(path, file)
+        file = path.open("rb")
+        archive = Archive(path, file)
     except OSError as error:
         raise CheckpointError(f"checkpoint {path} cannot be read: {error.strerror}; check the path") from None
+    with file:
+        yield archive
 
 
 def _digest(file: BinaryIO) -> bytes:

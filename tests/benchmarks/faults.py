@@ -19,8 +19,7 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rich.console import Console
-from rich.table import Table
+from tables import head, row
 
 import taichi_rts as rts
 
@@ -251,7 +250,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     chance, some, only = random.Random(options.seed), max(1, options.kills // 5), options.only.split(",")
-    table = Table("fault", "times tried", "outcome", "bytes lost")
+    head("fault", "times tried", "outcome", "bytes lost")
     with tempfile.TemporaryDirectory() as scratch:
         work = Path(scratch)
         os.environ.setdefault("TI_OFFLINE_CACHE_FILE_PATH", str(work / "cache"))
@@ -271,9 +270,7 @@ def main():
         for name in only:
             for result in tries[name]():
                 outcomes = "; ".join(f"{count} x {outcome}" for outcome, count in result.outcomes.items())
-                table.add_row(result.fault, str(result.tried), outcomes, f"{result.lost:,}")
-                print(result, file=sys.stderr, flush=True)
-    Console(width=140).print(table)
+                row(result.fault, result.tried, outcomes, f"{result.lost:,}")
 
 
 if __name__ == "__main__":

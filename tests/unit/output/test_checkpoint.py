@@ -2,7 +2,9 @@
 
 import json
 import random
+import sys
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,26 +15,12 @@ from taichi_rts.output.archive import open_archive, write_archive
 from taichi_rts.output.checkpoint import Checkpoint, differences
 from taichi_rts.state import State, is_part, is_plain, transient_names
 
-DRIVEN = rts.Scene(
-    domain=rts.Box((0, 0), (1, 1)),
-    fluids=[
-        rts.Block((0, 0), (1, 0.3)),
-        rts.Block((0.3, 0.4), (0.6, 0.7), velocity=(0, -3), kinematic_viscosity=0.01),
-    ],
-    spacing=0.05,
-    sound_speed="regional",
-    gravity_changes=[rts.GravityChange(0.03, (1.0, -9.0))],
-    moving_walls=[rts.MovingWall("x-", (0.0, 0.5), (0.0, 0.3))],
-    inflows=[rts.Inflow((0.4, 1.0), (0.6, 1.0), (0, -4), stop=0.06)],
-)
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+from faults_step import SCENE, STEPPERS
+
 STILL = rts.Scene(
     domain=rts.Box((0, 0), (1, 1)), fluids=[rts.Block((0, 0), (1, 0.3))], spacing=0.1, density="continuity"
 )
-STEPPERS = {
-    "uniform": rts.Uniform(adaptive=True),
-    "regional": rts.Regional(),
-    "asynchronous": rts.Asynchronous(steps="integers", stagger=1),
-}
 TIMELESS = {"wall_seconds", "overhead_fraction"}
 EARLY, LATE = 0.0213, 0.05
 
@@ -63,7 +51,7 @@ def test_the_same_bits_as_without_a_stop(start_taichi, quick, tmp_path, name, pr
     stepper = STEPPERS[name]
     path = tmp_path / "checkpoint.npz"
     with start_taichi("cpu", precision, **quick):
-        sim = rts.Simulation(DRIVEN, stepper, debug=name == "regional")
+        sim = rts.Simulation(SCENE, stepper, debug=name == "regional")
         stop_in_the_middle(sim, EARLY)
         if stepper.name == "asynchronous":
             assert sim.leads().max() > 0.0
