@@ -90,12 +90,11 @@ class Archive:
 @contextlib.contextmanager
 def open_archive(path: Path) -> Iterator[Archive]:
     """Open a file and check that it is a whole archive; raises `CheckpointError`."""
-    try:
-        file = path.open("rb")
-        archive = Archive(path, file)
-    except OSError as error:
-        raise CheckpointError(f"checkpoint {path} cannot be read: {error.strerror}; check the path") from None
-    with file:
+    with contextlib.ExitStack() as stack:
+        try:
+            archive = Archive(path, stack.enter_context(path.open("rb")))
+        except OSError as error:
+            raise CheckpointError(f"checkpoint {path} cannot be read: {error.strerror}; check the path") from None
         yield archive
 
 

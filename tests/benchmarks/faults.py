@@ -184,8 +184,10 @@ def second_run(work, wanted, times):
         folder = work / f"two{attempt}"
         process = start(*RUN, "--output-dir", str(folder))
         wait_for(process, lambda folder=folder: progress(folder) > 1)
+        process.send_signal(signal.SIGSTOP)  # or it might end before the second has begun
         code, err = run(*RUN, "--output-dir", str(folder), "--overwrite")
         refused = code == 2 and "is being written to by process" in err
+        process.send_signal(signal.SIGCONT)
         finish(process)
         lost = differing(files(folder), wanted)
         result.add("second refuses, first whole" if refused and not lost else f"exit {code}: {err}", lost)
@@ -263,7 +265,7 @@ def main():
             "interrupt": lambda: [stop(work, wanted, n, some, chance) for n in (signal.SIGINT, signal.SIGTERM)],
             "full": lambda: [full_disk(work, wanted, 1)],
             "deleted": lambda: [deleted_folder(work, wanted, some, chance)],
-            "two": lambda: [second_run(work, wanted, 1)],
+            "two": lambda: [second_run(work, wanted, some)],
             "damaged": lambda: damaged(reference, wanted, options.kills, chance),
             "middle": lambda: stopped_in_the_middle(work),
         }
