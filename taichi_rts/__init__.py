@@ -5,6 +5,7 @@ from taichi_rts.conditions import GravityChange, Inflow, MovingWall
 from taichi_rts.diagnostics import Energy
 from taichi_rts.errors import (
     BackendError,
+    CheckpointError,
     Error,
     OutputError,
     RenderError,
@@ -23,6 +24,7 @@ from taichi_rts.obstacles import (
     PolygonObstacle,
     SphereObstacle,
 )
+from taichi_rts.output.checkpoint import load_checkpoint, save_checkpoint
 from taichi_rts.output.export import Exporter, write_particles
 from taichi_rts.output.series import Series
 from taichi_rts.particle_files.formats import read_particles
@@ -44,6 +46,7 @@ __all__ = [
     "Block",
     "Box",
     "BoxObstacle",
+    "CheckpointError",
     "ConstantMotion",
     "CylinderObstacle",
     "Energy",
@@ -78,8 +81,10 @@ __all__ = [
     "Uniform",
     "View",
     "init",
+    "load_checkpoint",
     "load_scene",
     "read_particles",
+    "save_checkpoint",
     "scene_names",
     "write_particles",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import sys
+import warnings
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -12,9 +13,19 @@ import tyro
 import taichi_rts as rts
 from taichi_rts import backend, report
 from taichi_rts.compare.command import Compare
-from taichi_rts.errors import Error, OutputError, SimulationDivergedError
+from taichi_rts.errors import CheckpointError, Error, OutputError, SimulationDivergedError
 from taichi_rts.extremes import Extremes
+from taichi_rts.output.checkpoint import Checkpoint
 from taichi_rts.output.export import DEFAULT_ATTRIBUTES
+from taichi_rts.output.interrupts import Interrupts
+from taichi_rts.output.resume import (
+    command_data,
+    continued,
+    finished_until,
+    has_checkpoints,
+    open_checkpoint,
+    output_folder,
+)
 from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
 from taichi_rts.rendering.painter import Mode, PictureOptions
 from taichi_rts.stability.command import Stability
@@ -27,17 +38,17 @@ class Run:
     """Run a scene and save its frames.
 
     Writes OUTPUT_DIR/frames/000000.png ... at exact physical times, and OUTPUT_DIR/run.json. Exit codes: 0 done, 2 wrong
-    input or nothing to run on.
+    input or nothing to run on, 130 or 143 interrupted by Ctrl-C or SIGTERM: then `--resume OUTPUT_DIR` goes on.
     """
 
-    scene: tyro.conf.Positional[str] = "double_dam_break"
-    """Name of a built-in scene (see `taichi-rts scenes`) or path of a TOML file."""
+    scene: tyro.conf.Positional[str | None] = None
+    """Name of a built-in scene (see `taichi-rts scenes`) or path of a TOML file; by default double_dam_break."""
     arch: Literal["auto", "cuda", "vulkan", "cpu"] = "auto"
     """Where kernels run; auto takes the first of cuda, vulkan, cpu that is there. A named one never falls back."""
-    precision: Literal["f32", "f64"] = "f32"
-    """Floating-point precision."""
-    stepper: Literal["uniform", "regional", "asynchronous"] = "regional"
-    """One step for all, a step for each block, or a time for each block."""
+    precision: Literal["f32", "f64"] | None = None
+    """Floating-point precision; by default f32."""
+    stepper: Literal["uniform", "regional", "asynchronous"] | None = None
+    """One step for all, a step for each block, or a time for each block; by default regional."""
     preset: Literal["paper"] | None = None
     """Regional: the paper's setting (courant 0.4, 3 levels, Eq. 1 not enforced beyond level 1)."""
     courant: float | None = None
@@ -80,6 +91,10 @@ class Run:
     """Folder for the results; by default out/SCENE."""
     overwrite: bool = False
     """Replace an earlier run's frames, video and run.json in the output folder."""
+    checkpoint_every: float | None = None
+    """Write a checkpoint to OUTPUT_DIR/checkpoints every so many physical seconds [s], and at the end (docs/restart.md)."""
+    resume: Path | None = None
+    """Go on from this checkpoint, or from the newest one of this output folder; scene, stepper and options are its own."""
     renderer: Literal["splatter", "ggui"] = "splatter"
     """splatter needs no Vulkan and no display; ggui is Taichi's own."""
     width: int = 1280
@@ -113,65 +128,116 @@ class Run:
 
     def __call__(self) -> None:
         """Run it."""
-        changes = {key: getattr(self, key) for key in ("spacing", "sound_speed", "end_time")}
-        changes = {key: value for key, value in changes.items() if value is not None}
-        scene = rts.load_scene(self.scene, particles=self.particles, **changes)
+        if self.gui and (self.panels or self.debug or self.resume or self.checkpoint_every):
+            raise OutputError(
+                "--gui shows one run and checks and keeps nothing; leave out --panels, --debug, --resume and "
+                "--checkpoint-every, or --gui"
+            )
+        if self.resume is not None:
+            self.go_on(self.resume)
+            return
+        scene = self.load()
         stepper = self.make_stepper()
         panels = self.make_panels(scene.name, stepper)
-        options = PictureOptions(
-            **{f.name: getattr(self, f.name) for f in dataclasses.fields(PictureOptions) if hasattr(self, f.name)}
-        )
-        if self.gui and (self.panels or self.debug):
-            raise OutputError("--gui shows one run and checks nothing; leave out --panels and --debug, or --gui")
         if self.gui and (self.video or self.gif or self.export or not self.frames):
             raise OutputError("--gui saves nothing; leave out --video, --gif, --export and --no-frames, or --gui")
         if self.gui:
             from taichi_rts.rendering.live import watch  # only here, because it needs Vulkan and a display
 
-            watch(scene, stepper, options, lambda: rts.init(self.arch, self.precision))
+            watch(scene, stepper, self.picture(), lambda: rts.init(self.arch, self.precision or "f32"))
             return
+        self.record(scene, panels)
+
+    def load(self) -> rts.Scene:
+        """Load the scene that the options describe."""
+        changes = {key: getattr(self, key) for key in ("spacing", "sound_speed", "end_time")}
+        changes = {key: value for key, value in changes.items() if value is not None}
+        return rts.load_scene(self.scene or DEFAULT_SCENE, particles=self.particles, **changes)
+
+    def picture(self) -> PictureOptions:
+        """Return the options of pictures."""
+        return PictureOptions(
+            **{f.name: getattr(self, f.name) for f in dataclasses.fields(PictureOptions) if hasattr(self, f.name)}
+        )
+
+    def record(self, scene: rts.Scene, panels: list[Panel], checkpoint: Checkpoint | None = None) -> None:
+        """Run `scene` and save its frames, from the start or from a checkpoint."""
         from taichi_rts.output.recorder import Recorder, Recording, frame_times
 
         folder = self.output_dir if self.output_dir is not None else Path("out") / scene.name
         recording = Recording(
-            folder, self.export_fps, self.video, self.overwrite, self.frames, self.gif, self.export, self.attributes
+            folder,
+            self.export_fps,
+            self.video,
+            self.overwrite,
+            self.frames,
+            self.gif,
+            self.export,
+            self.attributes,
+            self.checkpoint_every,
+            command_data(self),
         )
         recording.exporter(scene.dim)  # here, so that what is wrong is said before anything starts
         frames = len(frame_times(scene.end_time, self.export_fps))
         check_size(self.width, self.height)
-        device = rts.init(self.arch, self.precision)
-        recorder = Recorder(scene, panels, options, recording, debug=self.debug)
-        diagnoses, extremes = FirstDiagnoses(recorder.runs), Extremes(recorder.runs)
+        with Interrupts() as interrupts:
+            device = rts.init(self.arch, self.precision or "f32")
+            with Recorder(
+                scene, panels, self.picture(), recording, debug=self.debug, checkpoint=checkpoint
+            ) as recorder:
+                diagnoses, extremes = FirstDiagnoses(recorder.runs), Extremes(recorder.runs)
+                recorder.notes["extremes"] = extremes.data
+                if checkpoint and "extremes" in checkpoint.extra:
+                    extremes.take(checkpoint.extra["extremes"])
 
-        def look() -> None:
-            diagnoses.look()
-            extremes.look()
+                def look() -> None:
+                    diagnoses.look()
+                    extremes.look()
 
-        try:
-            with report.progress(recorder.runs, scene.end_time, device, look) as on_frame:
-                recorder.record(scene.end_time, on_frame)
-        except SimulationDivergedError:
-            diagnoses.look()
-            for diagnosis in diagnoses.found.values():
-                report.print_diagnosis(diagnosis)
-            raise
+                interrupts.defer()
+                try:
+                    with report.progress(recorder.runs, scene.end_time, device, look) as on_frame:
+                        recorder.record(scene.end_time, on_frame, interrupts.asked)
+                except SimulationDivergedError:
+                    diagnoses.look()
+                    for diagnosis in diagnoses.found.values():
+                        report.print_diagnosis(diagnosis)
+                    raise
         for stepper, sim in recorder.runs.items():
             report.print_table(
                 sim, recorder.initial_energy[stepper], diagnoses.found.get(stepper), extremes.facts(stepper)
             )
         report.print_folder(folder, frames, recorder.files())
 
+    def go_on(self, path: Path) -> None:
+        """Go on from a checkpoint; what this command says besides must not contradict it."""
+        folder = output_folder(path)
+        until = finished_until(folder) if folder is not None else -1.0
+        try:
+            with open_checkpoint(path) as checkpoint:
+                run, scene, panels = continued(self, path, checkpoint)
+                done = until >= scene.end_time * (1 - 1e-9) and not self.overwrite and self.output_dir in (None, folder)
+                if not done:
+                    run.record(scene, panels, checkpoint)
+        except CheckpointError:
+            done = until >= 0.0 and path.is_dir() and not has_checkpoints(path)  # it made none, and needs none
+            if not done:
+                raise
+        if done and folder is not None:
+            report.print_finished(folder, until)
+
     def make_stepper(self) -> Any:
         """Build the stepper from the options that were given; raises `StepperError` if one does not belong to it."""
-        kind = STEPPERS[self.stepper]
+        name = self.stepper or rts.Regional.name
+        kind = STEPPERS[name]
         given = self.stepper_options()
         if foreign := sorted(set(given) - set(kind.__dataclass_fields__)):
-            raise rts.StepperError(f"{flags(foreign)} does not belong to the {self.stepper} stepper; leave it out")
+            raise rts.StepperError(f"{flags(foreign)} does not belong to the {name} stepper; leave it out")
         return kind(**given)
 
     def make_panels(self, scene: str, stepper: Any) -> list[Panel]:
         """Return the panels of a layout, or one with `stepper`; raises `StepperError` if both were asked for."""
-        given = [*(["stepper"] if self.stepper != Run.stepper else []), *self.stepper_options()]
+        given = [*(["stepper"] if self.stepper else []), *self.stepper_options()]
         if self.panels and given:
             raise rts.StepperError(f"--panels {self.panels} has steppers of its own; leave out {flags(given)}")
         layout = self.panels or (None if given else DEFAULT_LAYOUT.get(scene))
@@ -188,6 +254,7 @@ class Run:
 
 STEPPER_OPTIONS = sorted({key for kind in STEPPERS.values() for key in kind.__dataclass_fields__} & set(vars(Run)))
 """Options of `Run` that are some stepper's parameters."""
+DEFAULT_SCENE = "double_dam_break"
 
 
 def flags(keys: list[str]) -> str:
@@ -247,11 +314,14 @@ def parse_demo(default: Run, args: list[str] | None = None) -> Run:
 
 
 def _execute(command: Any) -> None:
-    try:
-        command()
-    except Error as error:
-        print(f"taichi-rts: {error}", file=sys.stderr)
-        raise SystemExit(2) from None
-    except KeyboardInterrupt:
-        print("taichi-rts: interrupted; frames already written are complete", file=sys.stderr)
-        raise SystemExit(130) from None
+    with warnings.catch_warnings():
+        warnings.showwarning = lambda message, *_: print(f"taichi-rts: warning: {message}", file=sys.stderr)
+        try:
+            command()
+        except Error as error:
+            print(f"taichi-rts: {error}", file=sys.stderr)
+            raise SystemExit(2) from None
+        except KeyboardInterrupt as stop:
+            said = str(stop) or "interrupted; frames already written are complete"
+            print(f"taichi-rts: {said}", file=sys.stderr)
+            raise SystemExit(getattr(stop, "exit_code", 130)) from None

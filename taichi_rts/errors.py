@@ -27,8 +27,16 @@ class OutputError(Error, OSError):
     """Something cannot be written where it was asked for."""
 
 
+class CheckpointError(Error, ValueError):
+    """A checkpoint cannot be read, is damaged, or belongs to another run."""
+
+
 class RenderError(Error, RuntimeError):
     """A picture or a window cannot be made."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """A run was asked to stop and has stopped between two steps."""
 
 
 class SimulationDivergedError(Error, ArithmeticError):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,15 @@ class Extremes:
             self.mach[key] = max(self.mach[key], float(mach.max()))
             self.density[key] = max(self.density[key], float(ratio.max()))
             self.dense[key] = max(self.dense[key], float((ratio > DENSE).mean()))
+
+    def data(self) -> list[list[float]]:
+        """Return what has been seen so far, run by run, for a checkpoint."""
+        return [[self.mach[key], self.density[key], self.dense[key]] for key in self.runs]
+
+    def take(self, data: Sequence[Sequence[float]]) -> None:
+        """Go on from what `data` returned."""
+        for key, values in zip(self.runs, data, strict=True):
+            self.mach[key], self.density[key], self.dense[key] = values
 
     def facts(self, key: Any) -> list[tuple[str, str]]:
         """Return rows for the table of a run."""

@@ -181,6 +181,8 @@ class BlockGrid:
     history. Work: two passes over the particles, two over the cells.
     """
 
+    transient = frozenset({"rank", "cell_count"})
+
     def __init__(self, geometry: Geometry, count: int, alive: ti.Field | None = None) -> None:
         self.geometry = geometry
         self.alive = ti.field(ti.i32, ()) if alive is None else alive

@@ -41,6 +41,8 @@ class Particles:
             a regional sound speed `sound_work` [J/kg], what its changes have put into the energy of compression.
     """
 
+    transient = frozenset({"reals", "integers", "real_scratch", "integer_scratch"})
+
     def __init__(
         self,
         positions: np.ndarray,
@@ -149,6 +151,8 @@ class Neighbourhood:
     Only entries near a due particle are filled in a step. `padding` entries behind the last may be read by loops of
     constant length; they count for nothing.
     """
+
+    transient = frozenset({"x", "v", "rho", "p_over_rho2", "a", "elapsed", "viscosity"})
 
     def __init__(self, count: int, dim: int, backend: Backend, needs: Set[str] = frozenset()) -> None:
         self.count = count

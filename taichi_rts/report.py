@@ -162,6 +162,15 @@ def print_folder(folder: Path, frames: int, files: Mapping[str, Any]) -> None:
     console.print(f"{pictures}{particles}{series}facts in {folder / 'run.json'}", soft_wrap=True)
 
 
+def print_finished(folder: Path, end_time: float) -> None:
+    """Say that there is nothing to go on with."""
+    console.print(
+        f"{folder} is finished (t = {end_time:g} s); a later --end-time goes on, --overwrite runs again from the checkpoint",
+        soft_wrap=True,
+        highlight=False,
+    )
+
+
 def print_scenes(scenes: list[Scene]) -> None:
     """Print a table of scenes."""
     table = Table("name", "dim", "particles", "end [s]", "what it is")

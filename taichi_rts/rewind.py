@@ -3,25 +3,28 @@
 import copy
 from typing import Any
 
-import numpy as np
 import taichi as ti
 
-PACKAGE = "taichi_rts"
-PLAIN = (bool, int, float, str, type(None), np.ndarray, np.generic)
+from taichi_rts.state import State
 
 
 @ti.data_oriented
 class Rewind:
-    """Keeps a copy of all fields and plain numbers that a `Simulation` is made of; `restore` puts them back.
+    """Keeps a copy of all fields and plain numbers of a `Simulation` (`State`); `restore` puts them back.
 
     A run from there gives the same bits again (where a device's own sums are deterministic). It costs the memory of the fields
     once more and two kernels, instead of compiling some thirty of them for each repeat.
     """
 
     def __init__(self, sim: Any) -> None:
-        self.fields: list[Any] = []
+        state = State(sim)
+        self.fields = list(state.fields.values())
         self.owners: list[tuple[dict[str, Any], dict[str, Any], frozenset[str]]] = []
-        self._collect(sim, set())
+        values: dict[str, dict[str, Any]] = {path: {} for path in state.owners}
+        for path, name, value in state.values():
+            values[path][name] = copy.deepcopy(value)
+        for path, owner in state.owners.items():
+            self.owners.append((owner, values[path], frozenset(owner)))
         self.copies = [_like(each) for each in self.fields]
         self.save()
 
@@ -44,32 +47,6 @@ class Rewind:
         for k in ti.static(range(len(self.fields))):
             for place in ti.grouped(self.fields[k]):
                 self.fields[k][place] = self.copies[k][place]
-
-    def _collect(self, thing: Any, seen: set[int]) -> None:
-        if id(thing) in seen:
-            return
-        seen.add(id(thing))
-        if isinstance(thing, ti.Field):
-            self.fields.append(thing)
-        elif isinstance(thing, (list, tuple)):
-            for each in thing:
-                self._collect(each, seen)
-        elif isinstance(thing, dict):
-            for each in thing.values():
-                self._collect(each, seen)
-        elif type(thing).__module__.split(".")[0] == PACKAGE and hasattr(thing, "__dict__"):
-            values = {key: copy.deepcopy(value) for key, value in vars(thing).items() if _is_plain(value)}
-            self.owners.append((vars(thing), values, frozenset(vars(thing))))
-            for value in vars(thing).values():
-                self._collect(value, seen)
-
-
-def _is_plain(value: Any) -> bool:
-    if isinstance(value, (list, tuple)):
-        return all(_is_plain(each) for each in value)
-    if isinstance(value, dict):
-        return all(_is_plain(each) for each in value.values())
-    return isinstance(value, PLAIN)
 
 
 def _like(field: Any) -> Any:

@@ -12,6 +12,8 @@ class ExclusiveScan:
     Two levels of about sqrt(n) entries: chunks in parallel, one thread over the chunks' sums, chunks in parallel.
     """
 
+    transient = frozenset({"counts", "sums"})
+
     def __init__(self, counts: ti.Field, starts: ti.Field) -> None:
         self.n = counts.shape[0]
         if starts.shape[0] != self.n + 1:

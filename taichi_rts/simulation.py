@@ -14,7 +14,7 @@ from PIL import Image
 from taichi_rts import backend as backends
 from taichi_rts.bodies import bodies
 from taichi_rts.diagnostics import Energy, Overhead, Tally, measure_energy
-from taichi_rts.errors import Error, SimulationDivergedError, TimeError
+from taichi_rts.errors import Error, Interrupted, SimulationDivergedError, TimeError
 from taichi_rts.frames import frame_times
 from taichi_rts.grid import BlockGrid, Geometry
 from taichi_rts.inflow import Inflows
@@ -149,6 +149,8 @@ class Simulation:
         self._tally = Tally(self.schedule.levels)
         self._sorts = 0
         self._time = 0.0
+        self.stop_asked: Callable[[], bool] = lambda: False
+        """Asked after every step; once it is true `advance_to` raises `Interrupted`, and may be called again."""
         self._gravity_work = 0.0
         self._initial_momentum = self.momentum()
         began = clock.perf_counter()
@@ -195,6 +197,7 @@ class Simulation:
 
         The sequence of steps does not depend on the times asked for. Raises `TimeError` for a time in the past and
         `SimulationDivergedError` when the state is no longer finite.
+        A run that `stop_asked` interrupts keeps its `time`; the steps that it has done ahead of it are not done again.
         """
         if time < self._time:
             raise TimeError(f"time {time:g} s lies before the present {self._time:g} s; runs only go forward")
@@ -245,14 +248,18 @@ class Simulation:
         target = self.timeline.ticks_until(time)
         ti.sync()
         began = clock.perf_counter()
-        while self.schedule.begin(self.timeline, target):
+        stopped = False
+        while not stopped and self.schedule.begin(self.timeline, target):
             with self.overhead.sampled_step(self.schedule.due_count):
                 self.step()
             if (self.schedule.steps - self._tally.base_steps + 1) * self.particles.count > COUNTER_LIMIT:
                 self._collect_counts()
+            stopped = self.stop_asked()
         ti.sync()
         self._tally.wall_seconds += clock.perf_counter() - began
         self._collect_counts()
+        if stopped:
+            raise Interrupted
         self._time = float(time)
 
     def _collect_counts(self) -> None:

@@ -18,7 +18,7 @@ from taichi_rts.rewind import Rewind
 from taichi_rts.scene import scene_from
 from taichi_rts.stability.survival import demanded_density, largest_stable, watch
 from taichi_rts.stepping.base import Stepper
-from taichi_rts.stepping.steppers import STEPPERS
+from taichi_rts.stepping.steppers import stepper_from
 
 NEIGHBOUR_SAMPLES = 5
 
@@ -65,16 +65,6 @@ class Outcome:
     survived: bool
     reason: str
     device: str
-
-
-def stepper_data(stepper: Any) -> dict[str, Any]:
-    """Return a stepper as plain data: its name and every parameter."""
-    return {"name": stepper.name, **dataclasses.asdict(stepper)}
-
-
-def stepper_from(data: dict[str, Any]) -> Any:
-    """Build the stepper that `stepper_data` described."""
-    return STEPPERS[data["name"]](**{key: value for key, value in data.items() if key != "name"})
 
 
 def run(job: Job) -> Outcome:

@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import taichi_rts as rts
-from taichi_rts.compare.jobs import Job, stepper_data
+from taichi_rts.compare.jobs import Job
 from taichi_rts.compare.trajectory import Trajectory
 from taichi_rts.errors import OutputError
 from taichi_rts.output.files import write_bytes
+from taichi_rts.stepping.steppers import stepper_data
 
 FINER = 8.0
 """How many times the smallest step tested is longer than the reference's."""

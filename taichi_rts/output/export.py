@@ -80,6 +80,10 @@ class Exporter:
         self.times: list[float] = []
         """Times [s] of the frames written."""
 
+    def take_up(self, times: Sequence[float]) -> None:
+        """Go on behind the frames of `times` [s], which an earlier run has written."""
+        self.times = list(times)
+
     def __call__(self, sim: Simulation) -> None:
         """Write the next frame."""
         if not self.formats:
@@ -92,8 +96,11 @@ class Exporter:
             assert each.write is not None  # for mypy
             write_bytes(self.folder / each.folder / f"{len(self.times) - 1:06d}{each.suffix}", each.write(frame))
         if "vtu" in self.formats:
+            particles = self.folder / "particles"
             names = [(time, f"{number:06d}.vtu") for number, time in enumerate(self.times)]
-            write_bytes(self.folder / "particles" / "particles.pvd", collection(names))
+            write_bytes(
+                particles / "particles.pvd", collection([each for each in names if (particles / each[1]).exists()])
+            )
 
     @property
     def files(self) -> dict[str, str]:

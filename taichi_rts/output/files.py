@@ -6,9 +6,9 @@ import contextlib
 import json
 import os
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from taichi_rts.errors import OutputError
 
@@ -22,26 +22,39 @@ ARTEFACTS = (
     "series.csv",
     "series_2.csv",
     "series_3.csv",
+    "checkpoints",
 )
 """What a run writes, and all that --overwrite removes."""
 
 
 def write_bytes(path: Path, data: bytes) -> None:
     """Write `data` to `path` in one go; raises `OutputError`, and then leaves what was there as it was."""
-    temporary = path.with_name(f".{path.name}.part")
+    with replacing(path) as file:
+        file.write(data)
+
+
+@contextlib.contextmanager
+def replacing(path: Path, temporary: Path | None = None) -> Iterator[BinaryIO]:
+    """Give a file to write and read that takes the place of `path` when all is well; until then it is at `temporary`.
+
+    Raises `OutputError` if it cannot be written, and then leaves what was there as it was.
+    """
+    if temporary is None:
+        temporary = path.with_name(f".{path.name}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("wb") as file:
-            file.write(data)
+        with temporary.open("w+b") as file:
+            yield file
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)
     except OSError as error:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
         raise OutputError(
             f"{path} cannot be written: {error.strerror}; free some space or choose another --output-dir"
         ) from None
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
 
 
 def write_json(path: Path, data: Any) -> None:
@@ -49,14 +62,23 @@ def write_json(path: Path, data: Any) -> None:
     write_bytes(path, (json.dumps(data, indent=2, allow_nan=False) + "\n").encode())
 
 
-def prepare_folder(folder: Path, overwrite: bool) -> None:
+def prepare_folder(folder: Path, overwrite: bool, resumed: Path | None = None) -> None:
     """Make `folder` ready for a run: new, empty, or with an earlier run's files removed if `overwrite`.
 
     Raises `OutputError` if it holds an earlier run and `overwrite` is off, is a file, or cannot be written to. Files that
-    no run wrote are never touched.
+    no run wrote are never touched. A run that goes on in the folder of the checkpoint `resumed` keeps all that is there; nor is
+    that file ever removed from elsewhere.
     """
     require_folder(folder)
     found = [name for name in ARTEFACTS if (folder / name).exists()]
+    if resumed is not None:
+        if resumed.resolve().parent == (folder / "checkpoints").resolve():
+            require_writable(folder)
+            remove(folder, [path.relative_to(folder).as_posix() for path in folder.glob("frames/.*.part")])
+            return
+        places = (resumed.resolve(), *resumed.resolve().parents)
+        if overwrite and any((folder / name).resolve() in places for name in found):
+            raise OutputError(f"{resumed} lies in what {folder} would be cleared of; choose another --output-dir")
     if found and not overwrite:
         raise OutputError(
             f"{folder} already holds a run ({', '.join(found)}); choose another --output-dir, or give --overwrite"

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import heapq
+import itertools
+import math
 import platform
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -12,10 +16,14 @@ from typing import Any
 import imageio.v3 as imageio
 import numpy as np
 
-from taichi_rts.errors import OutputError
+from taichi_rts.diagnostics import Energy
+from taichi_rts.errors import CheckpointError, Interrupted, OutputError
 from taichi_rts.frames import frame_times
+from taichi_rts.output.checkpoint import Checkpoint, write
 from taichi_rts.output.export import DEFAULT_ATTRIBUTES, Exporter
 from taichi_rts.output.files import prepare_folder, write_bytes, write_json
+from taichi_rts.output.lock import FolderLock
+from taichi_rts.output.resume import checkpoint_name, newest, output_folder
 from taichi_rts.output.series import Series
 from taichi_rts.output.video import Gif, Video, require_video
 from taichi_rts.panels import Panel
@@ -29,7 +37,11 @@ PNG_COMPRESSION = 3  # of 9: 40 instead of 120 ms a frame for 10 % more bytes
 
 @dataclasses.dataclass(frozen=True)
 class Recording:
-    """Where a run is recorded to, what of it, and how often; `fps` is frames per physical second."""
+    """Where a run is recorded to, what of it, and how often; `fps` is frames per physical second.
+
+    Every `checkpoint_every` physical seconds [s], and at the end, it writes a checkpoint; `command` is what checkpoints say of
+    the command that made the run.
+    """
 
     folder: Path
     fps: float = 60.0
@@ -39,6 +51,14 @@ class Recording:
     gif: bool = False
     export: tuple[str, ...] = ()
     attributes: tuple[str, ...] = DEFAULT_ATTRIBUTES
+    checkpoint_every: float | None = None
+    command: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.checkpoint_every is not None and not 0.0 < self.checkpoint_every < math.inf:
+            raise OutputError(
+                f"--checkpoint-every {self.checkpoint_every:g} is no time above 0; give physical seconds, e.g. 0.1"
+            )
 
     def exporter(self, dim: int) -> Exporter:
         """Return what writes particles in `dim` dimensions; raises `OutputError` for what contradicts itself or is missing."""
@@ -52,32 +72,90 @@ class Recording:
 
 
 class Recorder:
-    """Records one or more simulations of one scene, each shown in one or more panels, side by side in each frame."""
+    """Records one or more simulations of one scene, each shown in one or more panels, side by side in each frame.
+
+    With a `checkpoint` it goes on from there. While it is open (`with`), it has its folder for itself.
+    """
 
     def __init__(
-        self, scene: Scene, panels: list[Panel], options: PictureOptions, recording: Recording, *, debug: bool = False
+        self,
+        scene: Scene,
+        panels: list[Panel],
+        options: PictureOptions,
+        recording: Recording,
+        *,
+        debug: bool = False,
+        checkpoint: Checkpoint | None = None,
     ) -> None:
         steppers = dict.fromkeys(panel.stepper for panel in panels)  # one run for all panels that show it
         if recording.export and len(steppers) > 1:
             raise OutputError("--export writes the particles of one run, and there are several; leave out --panels")
         self.exporter = recording.exporter(scene.dim)
-        prepare_folder(recording.folder, recording.overwrite)
         self.scene = scene
         self.panels = panels
         self.recording = recording
-        self.runs = {stepper: Simulation(scene, stepper, debug=debug) for stepper in steppers}
-        self.initial_energy = {stepper: sim.energy() for stepper, sim in self.runs.items()}
-        self.series = [
-            Series(recording.folder / series_name(number), sim) for number, sim in enumerate(self.runs.values())
-        ]
-        self.painters: list[Painter] = []
-        if recording.pictures:
-            if len(panels) > 1:
-                options = dataclasses.replace(options, height=options.height // 2 // 2 * 2)
-            renderer = make_renderer(options)
-            self.painters = [
-                Painter(scene, dataclasses.replace(options, **panel.options), renderer=renderer) for panel in panels
+        self.frames_done = 0
+        self.notes: dict[str, Callable[[], Any]] = {}
+        """What else checkpoints keep as plain data, by name."""
+        self.lock = FolderLock(recording.folder)
+        try:
+            prepare_folder(recording.folder, recording.overwrite, checkpoint.archive.path if checkpoint else None)
+            if checkpoint is None:
+                self.runs = {stepper: Simulation(scene, stepper, debug=debug) for stepper in steppers}
+                self.initial_energy = {stepper: sim.energy() for stepper, sim in self.runs.items()}
+            else:
+                self._take_up(checkpoint)
+            self.times = frame_times(scene.end_time, recording.fps)[: self.frames_done]
+            self.exporter.take_up(self.times)
+            self.series = [
+                Series(recording.folder / series_name(number), sim, self.times)
+                for number, sim in enumerate(self.runs.values())
             ]
+            self.painters = self._make_painters(options) if recording.pictures else []
+        except BaseException:
+            self.lock.release()
+            raise
+
+    def _make_painters(self, options: PictureOptions) -> list[Painter]:
+        if len(self.panels) > 1:
+            options = dataclasses.replace(options, height=options.height // 2 // 2 * 2)
+        renderer = make_renderer(options)
+        return [
+            Painter(self.scene, dataclasses.replace(options, **panel.options), renderer=renderer)
+            for panel in self.panels
+        ]
+
+    def _take_up(self, checkpoint: Checkpoint) -> None:
+        scenes = [scene.replace(end_time=self.scene.end_time) for scene in checkpoint.scenes]
+        self.runs = {
+            stepper: checkpoint.simulation(number, scene)
+            for number, (stepper, scene) in enumerate(zip(checkpoint.steppers, scenes, strict=True))
+        }
+        kept = checkpoint.extra.get("initial_energy")
+        energies = [Energy(*each) for each in kept] if kept else [sim.energy() for sim in self.runs.values()]
+        self.initial_energy = dict(zip(self.runs, energies, strict=True))
+        frames = checkpoint.time * self.recording.fps
+        if (
+            "frames" in checkpoint.extra
+        ):  # if the run had ended between two frames, the last is that of another time now
+            self.frames_done = min(checkpoint.extra["frames"], math.floor(frames * (1 + 1e-9)) + 1)
+        else:  # it was saved by a script
+            self.frames_done = math.ceil(frames * (1 - 1e-9))
+        here = output_folder(checkpoint.archive.path) or Path()
+        if here.resolve() == self.recording.folder.resolve():
+            missing = [n for n in range(self.frames_done) if not self.frame_path(n).exists()]
+            if missing and self.recording.pictures:
+                warnings.warn(f"{len(missing)} earlier frames are missing, the first is {missing[0]:06d}", stacklevel=2)
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.lock.release()
+
+    def frame_path(self, number: int) -> Path:
+        """Return the path of a frame."""
+        return self.recording.folder / "frames" / f"{number:06d}.png"
 
     def paint(self) -> np.ndarray:
         """Return the picture of all panels at the present time."""
@@ -88,29 +166,115 @@ class Recorder:
             return images[0]
         return legend.vstack_panels(images, [panel.caption for panel in self.panels])
 
-    def record(self, end_time: float, on_frame: Callable[[float], None] = lambda time: None) -> dict[str, Any]:
-        """Run to `end_time` [s], write all frames, and return what `run.json` holds."""
+    def record(
+        self,
+        end_time: float,
+        on_frame: Callable[[float], None] = lambda time: None,
+        stop_asked: Callable[[], bool] = lambda: False,
+    ) -> dict[str, Any]:
+        """Run to `end_time` [s], write all frames and checkpoints, and return what `run.json` holds.
+
+        Once `stop_asked()` it writes a checkpoint and raises `Interrupted`. Raises `OutputError` where something cannot be
+        written, with what is whole and how to go on.
+        """
+        for sim in self.runs.values():
+            sim.stop_asked = stop_asked
+        films = self._begin_films()
+        try:
+            for time, number in self.moments(end_time):
+                for sim in self.runs.values():
+                    sim.advance_to(max(time, sim.time))
+                if number is None:
+                    self.save_checkpoint()
+                else:
+                    self._write_frame(number, films)
+                    on_frame(time)
+            for film in films:
+                film.close()
+            summary = self.summary()
+            self._check_folder()
+            write_json(self.recording.folder / "run.json", summary)
+        except Interrupted:
+            raise Interrupted(f"interrupted; {self.rescue()}") from None
+        except OutputError as error:
+            raise OutputError(f"{error}; {self.rescue()}") from None
+        finally:
+            for film in films:
+                film.drop()
+        return summary
+
+    def moments(self, end_time: float) -> Iterator[tuple[float, int | None]]:
+        """Yield what is still to be done until `end_time`: times [s] with the number of a frame, None for a checkpoint."""
+        times = enumerate(frame_times(end_time, self.recording.fps))
+        frames = ((time, number) for number, time in times if number >= self.frames_done)
+        present = min(sim.time for sim in self.runs.values())
+        saves = (time for time in checkpoint_times(end_time, self.recording.checkpoint_every) if time > present)
+        return heapq.merge(frames, ((time, None) for time in saves), key=lambda moment: (moment[0], moment[1] is None))
+
+    def _write_frame(self, number: int, films: list[Any]) -> None:
+        image = self.paint() if self.recording.pictures else None
+        self._check_folder()
+        for sim in self.runs.values():
+            self.exporter(sim)
+        for series in self.series:
+            series()
+        if image is not None:
+            data = imageio.imwrite("<bytes>", image, extension=".png", compress_level=PNG_COMPRESSION)
+            write_bytes(self.frame_path(number), data)
+            for film in films:
+                film.append(image)
+        self.frames_done = number + 1
+        self.times.append(min(sim.time for sim in self.runs.values()))
+
+    def _check_folder(self) -> None:
+        if not self.lock.check():
+            warnings.warn(
+                f"{self.recording.folder} has gone and was made again; frames before {self.frames_done:06d} and "
+                "earlier checkpoints are lost",
+                stacklevel=2,
+            )
+
+    def _begin_films(self) -> list[Any]:
+        """Begin the films, with the frames that are there already."""
         folder, fps = self.recording.folder, self.recording.fps
         films: list[Any] = [Video(folder / "video.mp4", fps)] if self.recording.video else []
         films += [Gif(folder / "video.gif", fps)] if self.recording.gif else []
-        for number, time in enumerate(frame_times(end_time, fps)):
-            for sim in self.runs.values():
-                sim.advance_to(time)
-                self.exporter(sim)
-            for series in self.series:
-                series()
-            if self.recording.pictures:
-                image = self.paint()
-                data = imageio.imwrite("<bytes>", image, extension=".png", compress_level=PNG_COMPRESSION)
-                write_bytes(folder / "frames" / f"{number:06d}.png", data)
+        for number in range(self.frames_done if films else 0):
+            if self.frame_path(number).exists():
                 for film in films:
-                    film.append(image)
-            on_frame(time)
-        for film in films:
-            film.close()
-        summary = self.summary()
-        write_json(self.recording.folder / "run.json", summary)
-        return summary
+                    film.append(imageio.imread(self.frame_path(number)))
+        return films
+
+    def save_checkpoint(self) -> Path:
+        """Write a checkpoint of all runs, and return its path; raises `OutputError`."""
+        sims, folder = list(self.runs.values()), self.recording.folder
+        time = max(max(sim.time, sim.timeline.time) for sim in sims)
+        extra = {
+            "scene": self.scene.to_dict(),
+            "frames": self.frames_done,
+            "initial_energy": list(self.initial_energy.values()),
+            "command": dict(self.recording.command),
+            **{name: note() for name, note in self.notes.items()},
+        }
+        path = folder / "checkpoints" / checkpoint_name(time)
+        self._check_folder()
+        write(path, sims, extra, temporary=folder / ".checkpoint.part")
+        return path
+
+    def rescue(self) -> str:
+        """Try to write a checkpoint, and say what there is to go on from."""
+        frames = f"{self.frames_done} frames are whole"
+        folder = self.recording.folder
+        try:
+            self.save_checkpoint()
+        except OutputError as error:
+            try:
+                last = newest(folder)
+            except CheckpointError:
+                return f"{frames}; there is no checkpoint, and none can be written now ({error})"
+            return f"{frames}, and the checkpoint {last}; to go on: taichi-rts run --resume {folder}"
+        time = min(sim.time for sim in self.runs.values())
+        return f"{frames}, until t = {time:g} s; to go on: taichi-rts run --resume {folder}"
 
     def summary(self) -> dict[str, Any]:
         """Describe the run: the first simulation in full, the others under `panels`, and what was written under `files`."""
@@ -123,12 +287,24 @@ class Recorder:
         found = {"frames": "frames/NNNNNN.png"} if wanted.pictures else {}
         found |= {name: path for name, path in (("video", "video.mp4"), ("gif", "video.gif")) if getattr(wanted, name)}
         series = [each.path.name for each in self.series]
-        return {**found, **self.exporter.files, "series": series, "times": self.series[0].times}
+        return {**found, **self.exporter.files, "series": series, "times": self.times}
 
 
 def series_name(number: int) -> str:
     """Name of the time series of run `number`, counted from 0."""
     return "series.csv" if number == 0 else f"series_{number + 1}.csv"
+
+
+def checkpoint_times(end_time: float, every: float | None) -> Iterator[float]:
+    """Times [s] of checkpoints: each multiple of `every`, and the end; none if that is None."""
+    if every is None:
+        return
+    for number in itertools.count(1):
+        time = number * every
+        if time >= end_time * (1 - 1e-9):
+            break
+        yield time
+    yield end_time
 
 
 def describe_run(sim: Simulation, initial_energy: Any) -> dict[str, Any]:

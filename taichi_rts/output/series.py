@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,8 @@ from taichi_rts.simulation import Simulation
 class Series:
     """The time series of `sim` in the file `path`: each call adds a row for its present time; an earlier file is replaced.
 
+    A run that goes on names the `times` [s] of the rows to keep; what comes behind them is cut off.
+
     Columns: time [s]; kinetic_energy, potential_energy, internal_energy [J]; front (fifth-largest x), centre_x ... [m], the
     centre of mass; max_speed [m/s]; level_n, the share of particles whose step is n base steps (where levels double: n up to
     2n - 1); particle_updates so far; pressure_NAME [Pa] of each probe of the scene; height_NAME [m] of each gauge;
@@ -26,12 +29,16 @@ class Series:
     dimensions energies and forces are per metre of depth.
     """
 
-    def __init__(self, path: str | Path, sim: Simulation) -> None:
+    def __init__(self, path: str | Path, sim: Simulation, times: Sequence[float] = ()) -> None:
         self.path = Path(path)
         self.sim = sim
         self.forces = FaceForces(sim.scene, sim.medium)
         self.times: list[float] = []
         """Times [s] of the rows written."""
+        if times and self.path.exists():
+            self.times = list(times)
+            rows = self.path.read_bytes().splitlines(keepends=True)[: len(times) + 1]
+            write_bytes(self.path, b"".join(rows))
 
     def __call__(self, sim: Simulation | None = None) -> None:
         """Add a row; `sim` is the one it was made for, for callers that name it."""

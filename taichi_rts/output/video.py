@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import math
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -37,12 +39,27 @@ class Video:
 
     def append(self, image: np.ndarray) -> None:
         """Add one frame; odd sides are cropped by a pixel, as the codec needs even ones."""
-        self.writer.append_data(image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2])
+        try:
+            self.writer.append_data(image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2])
+        except (OSError, ValueError) as error:
+            reason = str(error).splitlines()[0]
+            raise OutputError(
+                f"{self.path} cannot be written: {reason}; free some space, or leave out --video"
+            ) from None
 
     def close(self) -> None:
         """Finish the file and give it its name."""
         self.writer.close()
-        self.temporary.replace(self.path)
+        try:
+            self.temporary.replace(self.path)
+        except FileNotFoundError:
+            warnings.warn(f"{self.path} is lost: {self.temporary} was deleted; the frames are whole", stacklevel=2)
+
+    def drop(self) -> None:
+        """Leave it unfinished."""
+        with contextlib.suppress(OSError):
+            self.writer.close()
+        self.temporary.unlink(missing_ok=True)
 
 
 class Gif:
@@ -71,3 +88,7 @@ class Gif:
         first, *rest = self.frames
         first.save(temporary, save_all=True, append_images=rest, duration=self.duration, loop=0, optimize=False)
         temporary.replace(self.path)
+
+    def drop(self) -> None:
+        """Leave it unfinished."""
+        self.frames.clear()

@@ -30,6 +30,7 @@ class Walls:
     """
 
     moves = False
+    transient = frozenset({"x", "volume", "normal", "depth", "stiffness", "start", "near", "shift", "speed"})
 
     def __init__(self, layer: WallLayer, fluid: Neighbourhood, geometry: Geometry, backend: Backend) -> None:
         positions, volumes = layer.positions, layer.volumes

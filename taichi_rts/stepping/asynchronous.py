@@ -142,6 +142,7 @@ class AsynchronousSchedule(Cells):
     """
 
     levels_double = True
+    transient = frozenset({"reads_are_slow"})  # of the device
 
     def __init__(
         self, stepper: Asynchronous, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline

@@ -70,6 +70,7 @@ class Schedule:
     needs_sorting = True
     needs_sound = True
     sound: Any = None
+    transient = frozenset({"due", "flag"})
 
     def __init__(self, particles: Particles, grid: BlockGrid) -> None:
         self.particles = particles

@@ -9,9 +9,10 @@ import taichi_rts as rts
 from taichi_rts import cli
 from taichi_rts.compare import compare, executors, jobs, references
 from taichi_rts.compare.executors import Here, Task, collect
-from taichi_rts.compare.jobs import Job, stepper_data
+from taichi_rts.compare.jobs import Job
 from taichi_rts.compare.runner import Settings
 from taichi_rts.rewind import Rewind
+from taichi_rts.stepping.steppers import stepper_data
 
 SIZE = ["--particles", "100", "--end-time", "0.02", "--samples", "4", "--repeats", "2"]
 

@@ -5,9 +5,10 @@ import pytest
 
 import taichi_rts as rts
 from taichi_rts.compare import folder, references
-from taichi_rts.compare.jobs import Job, stepper_data, stepper_from
+from taichi_rts.compare.jobs import Job
 from taichi_rts.compare.references import job_key, reference_jobs, source_hash
 from taichi_rts.compare.trajectory import Trajectory
+from taichi_rts.stepping.steppers import stepper_data, stepper_from
 
 SCENE = rts.load_scene("dam_break_2d", particles=100)
 JOB = Job(SCENE.to_dict(), stepper_data(rts.Uniform()))

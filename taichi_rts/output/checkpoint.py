@@ -1,0 +1,200 @@
+"""Checkpoints: all that decides the bits of what follows, in one file.
+
+What is in it: every field and plain value of each simulation (`taichi_rts.state`), the scene and the stepper as plain data,
+precision, versions. A simulation is built anew from its scene and its stepper, then its state is put back.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from taichi_rts import backend
+from taichi_rts.errors import CheckpointError, Error
+from taichi_rts.output.archive import Archive, open_archive, write_archive
+from taichi_rts.scene import Scene, scene_from
+from taichi_rts.simulation import Simulation
+from taichi_rts.state import State
+from taichi_rts.stepping.steppers import stepper_data, stepper_from
+
+FORMAT = 1
+"""Counts up when the file's layout changes."""
+VALUE = "value:"
+"""Begins the names of arrays that are plain values, not fields."""
+
+
+def save_checkpoint(sim: Simulation, path: str | Path) -> None:
+    """Write all of `sim` to `path` (.npz), in one go; raises `OutputError`.
+
+    `load_checkpoint` gives a simulation that goes on with the same bits, on the same arch, as if it had never stopped.
+    """
+    write(Path(path), [sim])
+
+
+def load_checkpoint(path: str | Path, run: int = 0) -> Simulation:
+    """Build the simulation that `save_checkpoint` or a run with `--checkpoint-every` wrote.
+
+    Call `taichi_rts.init` first, with the precision that it had. `run` chooses one of several, where panels showed several.
+    Raises `CheckpointError` for a file that is not whole, is of another version, or has another precision.
+    """
+    with open_archive(Path(path)) as archive:
+        checkpoint = Checkpoint(archive)
+        if not 0 <= run < len(checkpoint.runs):
+            raise CheckpointError(
+                f"{path} has no run {run}, only {len(checkpoint.runs)} of them; use 0 to {len(checkpoint.runs) - 1}"
+            )
+        return checkpoint.simulation(run)
+
+
+def write(
+    path: Path, sims: Sequence[Simulation], extra: Mapping[str, Any] | None = None, temporary: Path | None = None
+) -> None:
+    """Write simulations that share a device, and `extra` plain data, to one file; raises `OutputError`."""
+    runs: list[dict[str, Any]] = []
+    arrays: dict[str, np.ndarray] = {}
+    for number, sim in enumerate(sims):
+        state = State(sim)
+        values: dict[str, dict[str, Any]] = {owner: {} for owner in state.owners}
+        for owner, name, value in state.values():
+            values[owner][name] = _encoded(value, f"{number}/{VALUE}{owner}.{name}", arrays)
+        arrays |= {f"{number}/{name}": field.to_numpy() for name, field in state.fields.items()}
+        scene, stepper = sim.scene.to_dict(), stepper_data(sim.stepper)
+        runs.append({"scene": scene, "stepper": stepper, "debug": sim.schedule.debug, "time": sim.time})
+        runs[-1] |= {"fields": list(state.fields), "values": values}
+    device = sims[0].backend
+    header = {
+        "format": FORMAT,
+        "version": version("taichi_rts"),
+        "versions": {"taichi": version("taichi"), "numpy": version("numpy"), "python": platform.python_version()},
+        "arch": device.arch,
+        "precision": device.precision,
+        "extra": dict(extra or {}),
+        "runs": runs,
+    }
+    write_archive(path, header, arrays, temporary)
+
+
+class Checkpoint:
+    """What is in an open archive. Raises `CheckpointError` unless this version can read it."""
+
+    def __init__(self, archive: Archive) -> None:
+        self.archive = archive
+        header = archive.header
+        for what, there, here in (
+            ("format", header.get("format"), FORMAT),
+            ("version", header.get("version"), version("taichi_rts")),
+        ):
+            if there != here:
+                raise CheckpointError(
+                    f"{archive.path} has {what} {there!r}, and this is taichi_rts {version('taichi_rts')} with {what} "
+                    f"{here!r}; go on with taichi_rts {header.get('version')}, or start the run again"
+                )
+        try:
+            self.arch, self.precision = str(header["arch"]), str(header["precision"])
+            self.extra, self.runs = dict(header["extra"]), list(header["runs"])
+            self.steppers = [stepper_from(run["stepper"]) for run in self.runs]
+            self.scenes = [scene_from(run["scene"], f"scene of {archive.path}") for run in self.runs]
+            self.debug = bool(self.runs[0]["debug"])
+            self.time = min(float(run["time"]) for run in self.runs)
+        except (KeyError, IndexError, TypeError, ValueError) as error:
+            raise archive.error(f"has a header that cannot be used: {error}") from None
+
+    def simulation(self, run: int, scene: Scene | None = None) -> Simulation:
+        """Build simulation number `run` in its present state; `scene`, if given, differs from its own in nothing that counts."""
+        sim = Simulation(scene or self.scenes[run], self.steppers[run], debug=self.runs[run]["debug"])
+        self.restore(sim, run)
+        return sim
+
+    def restore(self, sim: Simulation, run: int = 0) -> None:
+        """Put the state of number `run` into `sim`, which has the same scene and stepper; compiles next to nothing."""
+        data, device = self.runs[run], backend.current()
+        if device.precision != self.precision:
+            raise CheckpointError(
+                f"{self.archive.path} has precision {self.precision}, and {device.precision} is in use; "
+                f'call init(precision="{self.precision}")'
+            )
+        state = State(sim)
+        self._compare("field", set(data["fields"]), set(state.fields))
+        self._compare("part", set(data["values"]), set(state.owners))
+        wanted = {}  # all is read before anything is changed
+        for name, field in state.fields.items():
+            dtype = np.dtype(_numpy_type(field.dtype))
+            shape = (*field.shape, field.n) if getattr(field, "m", 0) == 1 and hasattr(field, "n") else field.shape
+            wanted[name] = self.archive.array(f"{run}/{name}", dtype, shape)
+        for name, field in state.fields.items():
+            field.from_numpy(wanted[name])
+        present: dict[str, set[str]] = {owner: set() for owner in state.owners}
+        for path, name, _value in state.values():
+            present[path].add(name)
+        for path, owner in state.owners.items():
+            for name in present[path] - set(data["values"][path]):
+                del owner[name]  # hides what the class says, such as `Schedule.needs_sorting`
+            for name, value in data["values"][path].items():
+                key = f"{run}/{VALUE}{path}.{name}"
+                if name not in owner or _encoded(owner[name], key, {}) != value or _holds_arrays(value):
+                    owner[name] = self._decoded(value, key, owner.get(name))
+
+    def _compare(self, what: str, there: set[str], here: set[str]) -> None:
+        if there != here:
+            names = ", ".join(sorted(there ^ here)[:3])
+            raise self.archive.error(f"was written by other code: {what} {names} is in one and not in the other")
+
+    def _decoded(self, value: Any, key: str, like: Any) -> Any:
+        """Return the plain value; what JSON makes a list of is a tuple where `like`, the present value, is one."""
+        if _holds_arrays(value):
+            array = self.archive.array(key)
+            if "array" in value:
+                return array
+            if "number" in value:
+                return array[()]
+            return list(np.split(array, np.cumsum(value["lengths"])[:-1]))
+        if isinstance(value, list):
+            return type(like)(value) if isinstance(like, tuple) else value
+        return value
+
+
+def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> str:
+    """Say in which keys two plain descriptions differ, and how; of things of two names only that. Empty if they do not."""
+    keys = [key for key in dict.fromkeys([*there, *here]) if there.get(key) != here.get(key)]
+    keys = ["name"] if "name" in keys else keys
+    return ", ".join(f"{key} {_short(there.get(key))} there and {_short(here.get(key))} here" for key in keys)
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _numpy_type(dtype: Any) -> Any:
+    from taichi.lang.util import to_numpy_type
+
+    return to_numpy_type(dtype)
+
+
+def _encoded(value: Any, key: str, arrays: dict[str, np.ndarray]) -> Any:
+    """Return a plain value as JSON has it; arrays go to `arrays` under `key`."""
+    if isinstance(value, np.ndarray):
+        arrays[key] = value
+        return {"array": True}
+    if isinstance(value, np.generic):
+        arrays[key] = np.asarray(value)
+        return {"number": True}
+    if isinstance(value, list) and value and all(isinstance(each, np.ndarray) and each.ndim == 1 for each in value):
+        arrays[key] = np.concatenate(value)
+        return {"lengths": [len(each) for each in value]}
+    if isinstance(value, (list, tuple)):
+        if any(isinstance(each, (np.ndarray, np.generic, dict)) for each in value):
+            raise Error(f"{key} is a list of what no checkpoint can hold; make it an array")
+        return [_encoded(each, key, arrays) for each in value]
+    if isinstance(value, dict):
+        raise Error(f"{key} is a dictionary, which no checkpoint can hold; make it a list or an array")
+    return value
+
+
+def _holds_arrays(value: Any) -> bool:
+    return isinstance(value, dict)
