@@ -44,7 +44,7 @@ class Series:
         """Add a row; `sim` is the one it was made for, for callers that name it."""
         row = self.measure()
         line = ",".join(f"{value:.9g}" for value in row.values()) + "\n"
-        if self.times:
+        if self.times and self.path.exists():  # the folder may have been deleted meanwhile
             append(self.path, line.encode())
         else:
             write_bytes(self.path, (",".join(row) + "\n" + line).encode())

@@ -21,7 +21,7 @@ sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from faults import TINY, differing, files, finish, mount, progress, start, wait_for
 
 RUN = ["run", "dam_break_2d", "--arch", "cpu", "--spacing", "0.1", "--end-time", "0.055", "--export-fps", "100"]
-RUN += ["--width", "160", "--height", "90", "--checkpoint-every", "0.02", "--video", "--stepper", "uniform"]
+RUN += ["--width", "160", "--height", "90", "--checkpoint-every", "0.02", "--video", "--stepper", "uniform", "--export", "vtu"]
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -77,7 +77,8 @@ def test_names_sort_by_time_and_times_end_at_the_end():
 def test_a_run_writes_checkpoints_and_nothing_else_there(reference, wanted):
     names = ["000000.020000000.npz", "000000.040000000.npz", "000000.055000000.npz"]
     assert sorted(path.name for path in (reference / "checkpoints").iterdir()) == names
-    assert sorted(path.name for path in reference.iterdir()) == ["checkpoints", "frames", "run.json", "video.mp4"]
+    found = sorted(path.name for path in reference.iterdir())
+    assert found == ["checkpoints", "frames", "particles", "run.json", "series.csv", "video.mp4"]
     assert len(wanted) == 8
 
 
@@ -88,15 +89,18 @@ def test_a_signal_ends_it_whole_and_it_goes_on(tmp_path, monkeypatch, capsys, wa
     said = capsys.readouterr().err
     assert f"interrupted; 3 frames are whole, until t = 0.02 s; to go on: taichi-rts run --resume {folder}" in said
     assert not (folder / "run.json").exists()
-    assert sorted(path.name for path in folder.iterdir()) == ["checkpoints", "frames"]
+    assert sorted(path.name for path in folder.iterdir()) == ["checkpoints", "frames", "particles", "series.csv"]
     assert float(newest(folder).stem) > 0.02
     monkeypatch.undo()
     assert command("run", "--resume", folder) == 0
     assert files(folder) == wanted
-    assert (folder / "video.mp4").read_bytes() == (reference / "video.mp4").read_bytes()
+    beside = ["video.mp4", "series.csv", *(f"particles/{path.name}" for path in (reference / "particles").iterdir())]
+    assert len(beside) == 2 + 7 + 1  # one for each frame, and the collection
+    for name in beside:
+        assert (folder / name).read_bytes() == (reference / name).read_bytes()
 
 
-def test_kill_9_and_the_same_bits(tmp_path, capsys, wanted):
+def test_kill_9_and_the_same_bits(tmp_path, capsys, wanted, reference):
     folder, chance = tmp_path / "out", random.Random(3)
     process = start(*RUN, "--output-dir", str(folder))
     moment = chance.randrange(4, 6)
@@ -108,12 +112,13 @@ def test_kill_9_and_the_same_bits(tmp_path, capsys, wanted):
     assert command("run", "--resume", folder) == 0
     assert f"was left by process {process.pid}, which is dead" in capsys.readouterr().err
     assert files(folder) == wanted
+    assert (folder / "series.csv").read_bytes() == (reference / "series.csv").read_bytes()
 
 
 def test_a_full_disk_is_a_clear_error_and_costs_nothing(tmp_path, capsys, wanted):
     disk = tmp_path / "disk"
     disk.mkdir()
-    if os.geteuid() or mount("-t", "tmpfs", "-o", f"size={TINY // 8}", "tmpfs", str(disk)):
+    if os.geteuid() or mount("-t", "tmpfs", "-o", f"size={TINY // 5}", "tmpfs", str(disk)):
         pytest.skip("mounting a small disk needs root")
     try:
         assert command(*RUN, "--output-dir", disk / "out") == 2
