@@ -195,30 +195,40 @@ class BlockGrid:
         self.cell_count = ti.field(ti.i32, geometry.cells)
         self.start = ti.field(ti.i32, geometry.cells + 1)
         self.scan = ExclusiveScan(self.cell_count, self.start)
+        self.tracks_arrivals = False
+
+    def track_arrivals(self) -> None:
+        """From now on note in `arrived`, (blocks,), which blocks a particle has come into; who reads it sets it back to 0.
+
+        Now and then, after particles were reordered in memory, all blocks count. Has to be called before the first `update`.
+        """
+        self.tracks_arrivals = True
+        self.arrived = ti.field(ti.i32, self.geometry.blocks)
 
     def update(self, locate: Callable[..., Any], identity: ti.Field, *time: Any) -> None:
         """Sort anew. `locate(*time)` is a kernel that calls `insert` once for every particle."""
-        self.cell_count.fill(0)
         locate(*time)
         self.scan.run()
-        self.place_particles()
-        self.order_cells(identity)
+        self.place_particles(identity)
 
     @ti.func
     def insert(self, i, x):
         """Count particle `i` at position `x` [m] into its cell."""
         cell = self.geometry.cell(x)
+        if ti.static(self.tracks_arrivals):
+            before = self.cell_of[i]
+            if before != cell:
+                if self.block_of(before) != self.block_of(cell):
+                    self.arrived[self.block_of(cell)] = 1
         self.cell_of[i] = cell
         self.rank[i] = ti.atomic_add(self.cell_count[cell], 1)
 
     @ti.kernel
-    def place_particles(self):
+    def place_particles(self, identity: ti.template()):  # two loops in one kernel: a launch costs as much as the first
         for i in range(self.alive[None]):
             self.order[self.start[self.cell_of[i]] + self.rank[i]] = i
-
-    @ti.kernel
-    def order_cells(self, identity: ti.template()):
         for c in range(self.geometry.cells):
+            self.cell_count[c] = 0  # for the next update
             first = self.start[c]
             for k in range(first + 1, self.start[c + 1]):  # insertion sort: a cell holds a handful
                 particle = self.order[k]

@@ -60,6 +60,8 @@ class SoundRule:
         """The same, with slack."""
         self.own = ti.field(float, self.blocks)
         """The largest sound speed of its particles, as compressed as they are."""
+        self.felt = ti.field(float, self.blocks)
+        """What its neighbours notice of it: its wish, and half of its target."""
         self.fresh = ti.field(float, self.blocks)
         self.target = ti.field(float, self.blocks)
         self.ceiling = ti.field(float, self.blocks)
@@ -67,55 +69,60 @@ class SoundRule:
         self.acceleration2 = ti.field(float, self.blocks)
         self.viscosity = ti.field(float, self.blocks)
 
-    def update(self, now: int, tick: float) -> None:
+    def update(self, read_at: ti.Field, now: int, tick: float) -> None:
         """Work out the targets and limits of all blocks at tick `now`.
 
-        What is said of neighbours' targets takes a block a call to spread, which no wave overtakes.
+        What is said of neighbours' targets takes a block a call to spread, which no wave overtakes. Only blocks that somebody
+        read in the last step (`read_at` of it is not negative), or that somebody has come into since, are looked at again:
+        in the others nobody has stepped.
         """
-        self.measure(now, tick)
-        self.spread()
-        self.bound()
+        self.work_out(read_at, now, tick)
 
     def update_some(self, cells: Any, tick: float) -> None:
         """Do the same for the cells that have just stepped (`stepping.cells.Cells`), each at its own time, and those beside."""
-        self.measure_some(cells.occupied, cells.occupied_count, cells.block_due, cells.time, tick)
-        self.spread_some(cells.occupied, cells.occupied_count, cells.read_at)
-        self.bound_some(cells.occupied, cells.occupied_count, cells.read_at)
+        self.work_out_some(cells.occupied, cells.occupied_count, cells.block_due, cells.time, cells.read_at, tick)
 
     @ti.kernel
-    def measure(self, now: ti.i32, tick: float):
+    def work_out(
+        self, read_at: ti.template(), now: ti.i32, tick: float
+    ):  # one kernel, for launches cost more than the last loops
         for block in range(self.blocks):
-            self.look_at(block, now, tick)
-
-    @ti.kernel
-    def spread(self):
+            if self.is_stale(block, read_at[block]):
+                self.look_at(block, now, tick)
+            self.felt[block] = ti.max(self.wish[block], 0.5 * self.target[block])
         for block in range(self.blocks):
             self.spread_to(block)
-
-    @ti.kernel
-    def bound(self):
         for block in range(self.blocks):
             self.take_over(block)
 
     @ti.kernel
-    def measure_some(
-        self, cells: ti.template(), count: ti.template(), due: ti.template(), time: ti.template(), tick: float
+    def work_out_some(
+        self,
+        cells: ti.template(),
+        count: ti.template(),
+        due: ti.template(),
+        time: ti.template(),
+        read_at: ti.template(),
+        tick: float,
     ):
         for m in range(count[None]):
             if due[cells[m]] > 0:
                 self.look_at(cells[m], time[cells[m]], tick)
-
-    @ti.kernel
-    def spread_some(self, cells: ti.template(), count: ti.template(), read_at: ti.template()):
+            self.felt[cells[m]] = ti.max(self.wish[cells[m]], 0.5 * self.target[cells[m]])
         for m in range(count[None]):
             if read_at[cells[m]] >= 0:
                 self.spread_to(cells[m])
-
-    @ti.kernel
-    def bound_some(self, cells: ti.template(), count: ti.template(), read_at: ti.template()):
         for m in range(count[None]):
             if read_at[cells[m]] >= 0:
                 self.take_over(cells[m])
+
+    @ti.func
+    def is_stale(self, block, read_at):
+        """Whether what is known of a block may have changed since it was looked at."""
+        stale = read_at >= 0 or (self.wish[block] > 0.0) != (self.grid.first(block) < self.grid.first(block + 1))
+        if ti.static(self.grid.tracks_arrivals):
+            stale = stale or self.grid.arrived[block] > 0
+        return stale
 
     @ti.func
     def look_at(self, block, now, tick):
@@ -158,7 +165,7 @@ class SoundRule:
         if target > 0.0:
             for k in ti.static(range(len(self.geometry.offsets))):
                 other = self.geometry.beside(block, k)
-                target = ti.max(target, ti.max(self.wish[other], 0.5 * self.target[other]))
+                target = ti.max(target, self.felt[other])
                 ceiling = ti.max(ceiling, self.wish_ceiling[other])
         self.fresh[block] = target
         self.ceiling[block] = ti.max(target, ceiling)

@@ -208,7 +208,14 @@ class RegionalSchedule(Schedule):
             self.ratio_sweeps = min(1, self.ratio_sweeps)
         self.grading_sweeps = max(0, self.levels - 2) if stepper.grading else 0
         self.block_level.fill(BlockLimiter.EMPTY)
-        self.flag = ti.field(ti.i32, particles.capacity)
+        if self.aligned:
+            grid.track_arrivals()
+            self.last_level = ti.field(ti.i32, blocks)
+            self.last_level.fill(BlockLimiter.EMPTY)
+            self.held = ti.field(ti.i32, blocks)
+            """Particles times base steps that are not in `occupancy` yet: one by one is quicker than all in one place."""
+        else:
+            self.flag = ti.field(ti.i32, particles.capacity)
         self.block_due = ti.field(ti.i32, blocks)
         self.due_start = ti.field(ti.i32, blocks + 1)
         self.scan = ExclusiveScan(self.block_due, self.due_start)
@@ -237,11 +244,13 @@ class RegionalSchedule(Schedule):
         """Algorithm 1, lines 5-16, and the list of due particles."""
         self.determine_regions(now, tick, self.reach)
         self.apply_minimum_region()
-        self.update_validity(now, now - self.now)
+        if self.aligned:
+            self.update_aligned_validity(now, now - self.now)
+        else:
+            self.update_validity(now, now - self.now)
         self.now = now
         self.scan.run()
-        self.compact_due()
-        self.mark_read()
+        self.list_due()
 
     @ti.kernel
     def determine_regions(self, now: ti.i32, tick: float, reach: float):
@@ -318,55 +327,75 @@ class RegionalSchedule(Schedule):
 
     @ti.kernel
     def update_validity(self, now: ti.i32, passed: ti.i32):
-        """Lines 10-16: find who is due; all take the step of their block. `passed` ticks have gone by since the last call."""
-        self.until_next[None] = self.levels
+        """Lines 10-16: find who is due, because its validity has run out or its block has another step.
+
+        All take the step of their block. `passed` ticks have gone by since the last call.
+        """
         for block in range(self.blocks):
             first, end = self.grid.first(block), self.grid.first(block + 1)
             level = self.block_level[block]
             count = 0
             for k in range(first, end):
                 i = self.grid.order[k]
-                flag = ti.cast(self.is_due(i, level, now), ti.i32)
-                if self.particles.level[i] != level:
+                own = self.particles.level[i]
+                flag = ti.cast(own - (now - self.particles.updated[i]) <= 0 or own != level, ti.i32)
+                if own != level:
                     self.particles.level[i] = level
                 self.flag[k] = flag
                 count += flag
             self.block_due[block] = count
             if first < end:
-                if ti.static(self.aligned):
-                    ti.atomic_min(self.until_next[None], level - now % level)
                 self.occupancy[level] += (end - first) * passed
                 self.updates[level] += count
 
-    @ti.func
-    def is_due(self, i, level, now):
-        """Whether particle `i` of a block with `level` is due: its validity has run out, or its block has another step.
+    @ti.kernel
+    def update_aligned_validity(self, now: ti.i32, passed: ti.i32):
+        """The same where steps end at multiples of themselves: a block is due as a whole, or nobody in it.
 
-        Where steps end at multiples of themselves: `level` divides `now`, or the step has become shorter. Whose step has become
-        longer then goes on to its end.
+        It is due at a multiple of its step, when that has become shorter, or when somebody comes into it with a longer one.
+        Who comes with a shorter one steps with the block. Particles of other blocks need not be looked at.
         """
-        own = self.particles.level[i]
-        due = False
-        if ti.static(self.aligned):
-            due = now % level == 0 or level < own
-        else:
-            due = own - (now - self.particles.updated[i]) <= 0 or own != level
-        return due
+        self.until_next[None] = self.levels
+        for block in range(self.blocks):
+            first, end = self.grid.first(block), self.grid.first(block + 1)
+            level, before = self.block_level[block], self.last_level[block]
+            count = 0
+            if level != before and self.held[block] > 0:
+                self.occupancy[before] += self.held[block]
+                self.held[block] = 0
+            if first < end:
+                due = now % level == 0 or level < before
+                if self.grid.arrived[block] > 0:
+                    self.grid.arrived[block] = 0
+                    for k in range(first, end):
+                        due = due or self.particles.level[self.grid.order[k]] > level
+                self.held[block] += (end - first) * passed
+                if due:
+                    count = end - first
+                    for k in range(first, end):
+                        self.particles.level[self.grid.order[k]] = level
+                    self.updates[level] += count
+                ti.atomic_min(self.until_next[None], level - now % level)
+            self.block_due[block] = count
+            self.last_level[block] = level
 
     @ti.kernel
-    def compact_due(self):
-        """List the places of due particles in the grid's order, so that memory access stays contiguous."""
+    def list_due(self):
+        """List the places of due particles in the grid's order, so that memory access stays contiguous.
+
+        And have the blocks read now that hold a due particle or lie beside one that does; the others are left alone.
+        """
         for block in range(self.blocks):
             if self.block_due[block] > 0:
                 n = self.due_start[block]
                 for k in range(self.grid.first(block), self.grid.first(block + 1)):
-                    if self.flag[k] == 1:
+                    if ti.static(self.aligned):
                         self.due[n] = k
                         n += 1
-
-    @ti.kernel
-    def mark_read(self):
-        """Have the blocks read now that hold a due particle or lie beside one that does; the others are left alone."""
+                    else:
+                        if self.flag[k] == 1:
+                            self.due[n] = k
+                            n += 1
         for block in range(self.blocks):
             due = 0
             if self.block_level[block] != BlockLimiter.EMPTY:
@@ -375,8 +404,17 @@ class RegionalSchedule(Schedule):
                     due = ti.max(due, self.block_due[self.grid.geometry.beside(block, k)])
             self.read_at[block] = 0 if due > 0 else -1
 
+    @ti.kernel
+    def count_held(self):
+        for block in range(self.blocks):
+            if self.held[block] > 0:
+                self.occupancy[self.last_level[block]] += self.held[block]
+                self.held[block] = 0
+
     def take_counts(self) -> tuple[list[int], list[int]]:
         """Return particles and updates per level since the last call."""
+        if self.aligned:
+            self.count_held()
         counts = self.occupancy.to_numpy()[1:].tolist(), self.updates.to_numpy()[1:].tolist()
         self.occupancy.fill(0)
         self.updates.fill(0)

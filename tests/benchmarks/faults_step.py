@@ -20,6 +20,7 @@ SCENE = rts.Scene(
     gravity_changes=[rts.GravityChange(0.03, (1.0, -9.0))],
     moving_walls=[rts.MovingWall("x-", (0.0, 0.5), (0.0, 0.3))],
     inflows=[rts.Inflow((0.4, 1.0), (0.6, 1.0), (0, -4), stop=0.06)],
+    obstacles=[rts.BoxObstacle((0.75, 0.35), (0.9, 0.5), motion=rts.ConstantMotion((0, -1)))],
 )
 STEPPERS = {
     "uniform": rts.Uniform(adaptive=True),

@@ -21,7 +21,19 @@ sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from faults import TINY, differing, files, finish, mount, progress, start, wait_for
 
 RUN = ["run", "dam_break_2d", "--arch", "cpu", "--spacing", "0.1", "--end-time", "0.055", "--export-fps", "100"]
-RUN += ["--width", "160", "--height", "90", "--checkpoint-every", "0.02", "--video", "--stepper", "uniform", "--export", "vtu"]
+RUN += [
+    "--width",
+    "160",
+    "--height",
+    "90",
+    "--checkpoint-every",
+    "0.02",
+    "--video",
+    "--stepper",
+    "uniform",
+    "--export",
+    "vtu",
+]
 
 
 @pytest.fixture(scope="module", autouse=True)
