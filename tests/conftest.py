@@ -16,6 +16,15 @@ def quick():
     return QUICK
 
 
+@pytest.fixture(scope="module")
+def quick_environment(kernel_cache):
+    """The same for what calls `rts.init` itself: commands, and programs in processes of their own."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in QUICK.items():
+            patch.setenv(f"TI_{name.upper()}", str(int(value)))
+        yield
+
+
 @pytest.fixture(scope="session", autouse=True)
 def kernel_cache(tmp_path_factory):
     """One for the whole run: what one process has compiled, neither xdist's other workers nor subprocesses compile again."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import taichi as ti
 
 from taichi_rts import backend
 from taichi_rts.errors import CheckpointError, Error
@@ -124,8 +125,7 @@ class Checkpoint:
         wanted = {}  # all is read before anything is changed
         for name, field in state.fields.items():
             dtype = np.dtype(_numpy_type(field.dtype))
-            shape = (*field.shape, field.n) if getattr(field, "m", 0) == 1 and hasattr(field, "n") else field.shape
-            wanted[name] = self.archive.array(f"{run}/{name}", dtype, shape)
+            wanted[name] = self.archive.array(f"{run}/{name}", dtype, (*field.shape, *_entry_shape(field)))
         for name, field in state.fields.items():
             field.from_numpy(wanted[name])
         present: dict[str, set[str]] = {owner: set() for owner in state.owners}
@@ -168,6 +168,13 @@ def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> str:
 def _short(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _entry_shape(field: Any) -> tuple[int, ...]:
+    """Return the shape of one entry of a field: of a number, a vector or a matrix."""
+    if not isinstance(field, ti.MatrixField):
+        return ()
+    return (field.n,) if field.m == 1 else (field.n, field.m)
 
 
 def _numpy_type(dtype: Any) -> Any:

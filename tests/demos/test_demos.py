@@ -8,6 +8,8 @@ from pathlib import Path
 import imageio.v3 as imageio
 import pytest
 
+pytestmark = pytest.mark.usefixtures("quick_environment")
+
 DEMOS = sorted((Path(__file__).parents[2] / "demos").glob("*.py"))
 COARSE = {
     "martin_moyce": 0.0127,

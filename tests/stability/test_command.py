@@ -9,6 +9,8 @@ from taichi_rts import cli
 from taichi_rts.stability import chart, command, suite
 from taichi_rts.stability.cases import CASES, Case
 
+pytestmark = pytest.mark.usefixtures("quick_environment")
+
 
 def tiny(mach=0.0):
     block = rts.Block((0, 0), (0.4, 0.2), velocity=(0, -40 * mach))

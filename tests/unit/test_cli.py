@@ -10,6 +10,8 @@ import taichi_rts as rts
 from taichi_rts import cli
 from taichi_rts.panels import LAYOUTS, Panel
 
+pytestmark = pytest.mark.usefixtures("quick_environment")
+
 SMALL = [
     "--arch",
     "cpu",

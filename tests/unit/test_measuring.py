@@ -84,7 +84,7 @@ def test_faces_without_walls_have_no_force():
 
 
 @pytest.mark.parametrize("density", ["summation", "continuity"])
-def test_forces_are_the_reaction_to_what_the_solver_does(start_taichi, density):
+def test_forces_are_the_reaction_to_what_the_solver_does(start_taichi, quick, density):
     """Against the walls' share of all accelerations in a debug run, with no friction at the walls."""
     piston = rts.MovingWall("x+", times=(0.0, 1.0), displacements=(0.0, -0.5))
     scene = pool(
@@ -95,7 +95,7 @@ def test_forces_are_the_reaction_to_what_the_solver_does(start_taichi, density):
         moving_walls=[piston],
         sound_speed=40.0,
     )
-    with start_taichi("cpu", "f64", advanced_optimization=False):
+    with start_taichi("cpu", "f64", **quick):
         sim = rts.Simulation(scene, rts.Uniform(), debug=True)
         sim.advance_to(0.25)
         forces = FaceForces(scene, sim.medium)

@@ -155,16 +155,16 @@ def test_plain_data_names_the_file_or_the_hash(tmp_path):
         scene_from(json.loads(json.dumps(data)))
 
 
-def test_one_runs_output_is_the_nexts_input(start_taichi, tmp_path):
+def test_one_runs_output_is_the_nexts_input(start_taichi, quick, tmp_path):
     """Half a dam break, its file, and the other half: the same to rounding as in one go, but for the start of the steps."""
     first = scene(rts.Block((0, 0), (0.8, 0.8)), sound_speed=40.0)
-    with start_taichi("cpu", "f64", advanced_optimization=False):
+    with start_taichi("cpu", "f64", **quick):
         sim = rts.Simulation(first, rts.Uniform())
         sim.run(0.1, on_frame=rts.Exporter(tmp_path, ["npz"]), fps=10)
         sim.advance_to(0.2)
         whole, moved = sim.positions(), np.linalg.norm(sim.positions() - sample(first).positions, axis=1).max()
     second = first.replace(fluids=[rts.Particles(file=str(tmp_path / "particles" / "000001.npz"))])
-    with start_taichi("cpu", "f64", advanced_optimization=False):
+    with start_taichi("cpu", "f64", **quick):
         sim = rts.Simulation(second, rts.Uniform())
         assert sim.count == 64
         sim.advance_to(0.1)

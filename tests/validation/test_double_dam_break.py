@@ -14,9 +14,9 @@ SCENE = rts.load_scene(
 )
 
 
-def watch(start_taichi, stepper, end_time):
+def watch(start_taichi, quick, stepper, end_time):
     seen = {"speed": [], "density": [], "energy": []}
-    with start_taichi("cpu", "f32"):
+    with start_taichi("cpu", "f32", **quick):
         sim = rts.Simulation(SCENE, stepper)
         start = sim.energy().total
         for time in np.linspace(0, end_time, 7)[1:]:
@@ -32,8 +32,8 @@ def watch(start_taichi, stepper, end_time):
 
 
 @pytest.fixture(scope="module")
-def corrected(start_taichi):
-    return watch(start_taichi, rts.Regional(preset="paper"), 0.3)
+def corrected(start_taichi, quick):
+    return watch(start_taichi, quick, rts.Regional(preset="paper"), 0.3)
 
 
 def test_density_stays_within_8_percent(corrected):
@@ -54,6 +54,6 @@ def test_nobody_had_to_be_stopped_by_the_domain(corrected):
     assert corrected["stopped_by_domain"] == 0
 
 
-def test_without_the_corrector_it_blows_up(start_taichi, corrected):
-    uncorrected = watch(start_taichi, rts.Regional(preset="paper", corrector=False), 0.15)
+def test_without_the_corrector_it_blows_up(start_taichi, quick, corrected):
+    uncorrected = watch(start_taichi, quick, rts.Regional(preset="paper", corrector=False), 0.15)
     assert max(uncorrected["speed"]) > 3 * max(corrected["speed"])

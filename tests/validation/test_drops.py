@@ -34,14 +34,14 @@ def semi_axes(x):
     return 2 * np.sqrt((x.astype(float) ** 2).mean(axis=0))
 
 
-def run_drops(start_taichi, name, frequency):
+def run_drops(start_taichi, quick, name, frequency):
     """Relative errors of the semi-axes, (PIECES, 2), and the statistics of the run, for each stepper."""
     scene = rts.load_scene(name, spacing=SPACING)
     times = scene.end_time * np.arange(1, PIECES + 1) / PIECES
     exact = np.stack(drop_axes(times, scene.fluids[0].velocity.gradient[0][0], frequency), axis=1)
     found = {}
     for key, stepper in STEPPERS.items():
-        with start_taichi("cpu", "f64"):
+        with start_taichi("cpu", "f64", **quick):
             sim = rts.Simulation(scene, stepper)
             axes = []
             for time in times:
@@ -52,13 +52,13 @@ def run_drops(start_taichi, name, frequency):
 
 
 @pytest.fixture(scope="module")
-def elliptical(start_taichi):
-    return run_drops(start_taichi, "elliptical_drop", 0.0)
+def elliptical(start_taichi, quick):
+    return run_drops(start_taichi, quick, "elliptical_drop", 0.0)
 
 
 @pytest.fixture(scope="module")
-def oscillating(start_taichi):
-    return run_drops(start_taichi, "oscillating_drop", 1.0)
+def oscillating(start_taichi, quick):
+    return run_drops(start_taichi, quick, "oscillating_drop", 1.0)
 
 
 @steppers

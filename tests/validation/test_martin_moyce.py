@@ -12,11 +12,11 @@ FRONTS = MARTIN_MOYCE_FRONT[:, 1]
 
 
 @pytest.fixture(scope="module")
-def columns(start_taichi):
+def columns(start_taichi, quick):
     """Fronts over a and heights over the first, by stepper."""
     found = {}
     for stepper in (rts.Uniform(), rts.Regional(), rts.Asynchronous()):
-        with start_taichi("cpu", "f32"):
+        with start_taichi("cpu", "f32", **quick):
             sim = rts.Simulation(rts.load_scene("martin_moyce", spacing=SPACING), stepper)
             fronts, heights = {}, {}
             for time in np.union1d(FRONT_TIMES, HEIGHT_TIMES):

@@ -10,10 +10,10 @@ CALM = np.sqrt(9.81 * DEPTH)
 
 
 @pytest.fixture(scope="module")
-def pools(start_taichi):
+def pools(start_taichi, quick):
     found = {}
     for stepper in (rts.Uniform(), rts.Regional(), rts.Asynchronous()):
-        with start_taichi("cpu", "f32"):
+        with start_taichi("cpu", "f32", **quick):
             sim = rts.Simulation(rts.load_scene("still_pool", spacing=SPACING), stepper)
             sim.advance_to(2.0)
             found[stepper.name] = (*sim.state(), sim.pressures(), sim.statistics["stopped_by_domain"])

@@ -14,6 +14,8 @@ from taichi_rts.compare.runner import Settings
 from taichi_rts.rewind import Rewind
 from taichi_rts.stepping.steppers import stepper_data
 
+pytestmark = pytest.mark.usefixtures("quick_environment")
+
 SIZE = ["--particles", "100", "--end-time", "0.02", "--samples", "4", "--repeats", "2"]
 
 

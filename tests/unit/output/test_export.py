@@ -23,12 +23,12 @@ SCENE = rts.Scene(
 
 
 @pytest.fixture(scope="module")
-def recorded(start_taichi, tmp_path_factory):
+def recorded(start_taichi, quick, tmp_path_factory):
     """A run whose particles go to all formats that hold two dimensions, and what it ended with."""
     folder = tmp_path_factory.mktemp("run") / "out"
     formats = ("vtu", "ply", "npz", "bgeo")
     recording = Recording(folder, 20.0, pictures=False, export=formats, attributes=tuple(ATTRIBUTES))
-    with start_taichi("cpu", "f32", advanced_optimization=False):
+    with start_taichi("cpu", "f32", **quick):
         recorder = Recorder(SCENE, [Panel("", rts.Asynchronous())], PictureOptions(), recording)
         facts = recorder.record(0.1)
         sim = recorder.runs[rts.Asynchronous()]
@@ -144,8 +144,8 @@ def test_core_imports_no_extra():
     assert done.stdout.strip().endswith("[]")
 
 
-def test_frames_of_a_run_in_python(start_taichi, tmp_path):
-    with start_taichi("cpu", "f32", advanced_optimization=False):
+def test_frames_of_a_run_in_python(start_taichi, quick, tmp_path):
+    with start_taichi("cpu", "f32", **quick):
         sim = rts.Simulation(SCENE, rts.Asynchronous())
         seen = []
         sim.run(0.05, on_frame=[lambda sim: seen.append(sim.time), rts.Exporter(tmp_path, ["npz"], ["id"])], fps=40)

@@ -37,12 +37,10 @@ RUN += [
 
 
 @pytest.fixture(scope="module", autouse=True)
-def ended(kernel_cache):
-    """Compiles a quarter faster, in subprocesses too; ends the last simulation."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("TI_ADVANCED_OPTIMIZATION", "0")
-        yield
-        ti.reset()
+def ended(quick_environment):
+    """Ends the last simulation."""
+    yield
+    ti.reset()
 
 
 @pytest.fixture(scope="module")
