@@ -110,7 +110,9 @@ def print_table(
         facts.add_row("sound speed", f"{c.min():.3g} to {c.max():.3g} m/s at the end, mean {c.mean():.3g}")
         if sim.particles.has_budget:
             facts.add_row("put in by its changes", f"{sim.sound_work():+.3g} J, in the drift")
-    facts.add_row("stopped by the box", f"{statistics['stopped_by_domain']} centres")
+    facts.add_row("stopped by the box", f"{statistics['stopped_by_domain']:,} centres")
+    if sim.scene.obstacles:
+        facts.add_row("held by obstacles", f"{statistics['stopped_by_obstacles']:,} times a centre")
     if statistics["runaways"]:
         facts.add_row("[bold red]blown up[/]", f"limited {statistics['runaways']:,} times; use a smaller --courant")
     console.print(facts)
