@@ -166,16 +166,16 @@ class Run:
 
         folder = self.output_dir if self.output_dir is not None else Path("out") / scene.name
         recording = Recording(
-            folder,
-            self.export_fps,
-            self.video,
-            self.overwrite,
-            self.frames,
-            self.gif,
-            self.export,
-            self.attributes,
-            self.checkpoint_every,
-            command_data(self),
+            folder=folder,
+            fps=self.export_fps,
+            video=self.video,
+            overwrite=self.overwrite,
+            pictures=self.frames,
+            gif=self.gif,
+            export=self.export,
+            attributes=self.attributes,
+            checkpoint_every=self.checkpoint_every,
+            command=command_data(self),
         )
         recording.exporter(scene.dim)  # here, so that what is wrong is said before anything starts
         frames = len(frame_times(scene.end_time, self.export_fps))

@@ -29,9 +29,9 @@ def periods(scene: Scene) -> np.ndarray:
 
 
 def nearest_image(gap: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Differences of positions [m], (N, dim), to the nearest image; `lengths` is what `periods` returns."""
+    """Differences of positions [m], (..., dim), to the nearest image; `lengths` is what `periods` returns."""
     wrapped = np.isfinite(lengths)
-    gap[:, wrapped] -= lengths[wrapped] * np.round(gap[:, wrapped] / lengths[wrapped])
+    gap[..., wrapped] -= lengths[wrapped] * np.round(gap[..., wrapped] / lengths[wrapped])
     return gap
 
 

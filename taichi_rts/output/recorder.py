@@ -31,6 +31,7 @@ from taichi_rts.rendering import legend
 from taichi_rts.rendering.painter import Painter, PictureOptions, make_renderer
 from taichi_rts.scene import Scene
 from taichi_rts.simulation import Simulation
+from taichi_rts.stepping.steppers import stepper_data
 
 PNG_COMPRESSION = 3  # of 9: 40 instead of 120 ms a frame for 10 % more bytes
 
@@ -241,8 +242,9 @@ class Recorder:
         films += [Gif(folder / "video.gif", fps)] if self.recording.gif else []
         for number in range(self.frames_done if films else 0):
             if self.frame_path(number).exists():
+                image = imageio.imread(self.frame_path(number))
                 for film in films:
-                    film.append(imageio.imread(self.frame_path(number)))
+                    film.append(image)
         return films
 
     def save_checkpoint(self) -> Path:
@@ -313,7 +315,7 @@ def describe_run(sim: Simulation, initial_energy: Any) -> dict[str, Any]:
     statistics = {key: value for key, value in sim.statistics.items() if key != "overhead_fraction"}
     return {
         "scene": sim.scene.to_dict(),
-        "stepper": {"name": sim.stepper.name, **dataclasses.asdict(sim.stepper)},  # type: ignore[call-overload]
+        "stepper": stepper_data(sim.stepper),
         "arch": sim.backend.arch,
         "precision": sim.backend.precision,
         "device": platform.processor() or platform.machine(),

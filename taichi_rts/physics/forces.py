@@ -7,6 +7,7 @@ import taichi as ti
 
 from taichi_rts.backend import Backend
 from taichi_rts.bodies import bodies
+from taichi_rts.measuring import nearest_image, periods
 from taichi_rts.motion import Motion
 from taichi_rts.physics.obstacles import MovingBody
 from taichi_rts.physics.walls import Walls, make_wall_sum
@@ -61,7 +62,7 @@ class ForceMeter:
         self.collect(rates, places)
         push = -mass * rates.astype(np.float64)
         pivots = np.array([self.pivot(k, now * tick) for k in range(len(self.sums))])
-        arms = self.nearest(places.astype(np.float64)[None] - pivots[:, None])
+        arms = nearest_image(places.astype(np.float64)[None] - pivots[:, None], periods(self.scene))
         if dim == 2:
             torques = (arms[..., 0] * push[..., 1] - arms[..., 1] * push[..., 0]).sum(axis=1)
         else:
@@ -74,11 +75,6 @@ class ForceMeter:
             body = self.moving[number]
             return body.pivot + body.pieces.pose(time)[0]
         return make_solid(self.scene.obstacles[number], self.scene.spacing).middle
-
-    def nearest(self, arms: np.ndarray) -> np.ndarray:
-        """Differences of places [m] to the nearest image along periodic axes."""
-        lengths = np.array(self.scene.domain.size)
-        return arms - np.where(self.scene.is_periodic, lengths * np.round(arms / lengths), 0.0)
 
     @ti.kernel
     def observe(self, now: ti.i32, tick: float):

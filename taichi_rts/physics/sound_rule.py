@@ -49,7 +49,6 @@ class SoundRule:
         self.cap = scene.wave_speed
         self.floor = scene.least_wave_speed
         self.rest_density = scene.rest_density
-        self.common_viscosity = 0.0 if particles.has_viscosity else max(scene.viscosities)
         self.inverse_mach2 = 1.0 / description.mach**2
         self.forgetting = 1.0 / (description.memory * scene.support)
         """1/(memory r) [1/m]: times c, the rate at which sound speeds fall and reference densities relax."""
@@ -129,7 +128,7 @@ class SoundRule:
         """Work out what a block needs for itself at tick `now`, 0 if it is empty, and its largest sound speed."""
         first, end = self.grid.first(block), self.grid.first(block + 1)
         wish, wish_ceiling, own = 0.0, 0.0, 0.0
-        acceleration2, viscosity = 0.0, self.common_viscosity
+        acceleration2, viscosity = 0.0, 0.0 if ti.static(self.particles.has_viscosity) else self.maxima.viscosity
         if first < end:
             p = self.particles
             speed2, pressure = self.maxima.wall_speed2(block, now, tick), 0.0
