@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any, ClassVar, Protocol
 
 import taichi as ti
 from pydantic import Field
@@ -18,7 +18,7 @@ Courant = Annotated[float, Field(gt=0, le=2)]
 class Stepper(Protocol):
     """A stepper's parameters, and how they become a schedule for one run. To add one, write one file like `uniform.py`."""
 
-    name: str
+    name: ClassVar[str]
 
     @property
     def follows_sound(self) -> bool:
