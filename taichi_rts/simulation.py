@@ -115,7 +115,7 @@ class Simulation:
         if self.sound:
             law = FloatingReference(self.medium.equation_of_state, self.particles, self.sound)
             self.medium = dataclasses.replace(self.medium, equation_of_state=law)
-        self.near = Neighbourhood(capacity, scene.dim, backend, needs)
+        self.near = Neighbourhood(capacity, scene.dim, backend, needs, geometry)
         self._obstacle_layers = start.obstacles
         self._meter: ForceMeter | None = None
         self.walls = make_walls(scene, start, self.near, self.grid, backend)
@@ -124,7 +124,7 @@ class Simulation:
             per_block = math.prod(geometry.sides) / scene.spacing**scene.dim
             windows = FluidWindows(self.near, self.grid, per_block, backend, needs)
             for wall in self.walls:
-                if not wall.moves:
+                if not wall.moves and not geometry.repeats:  # whose images would need places of their own
                     wall.windows = WallWindows(wall)
         self.density = density(self.particles, self.near, self.grid, windows, self.walls, self.medium, backend)
         gravity = Gravity(scene)

@@ -45,16 +45,19 @@ class Windows:
         """First entry of those in the run's own row."""
         self.far = geometry.upper[0] + FAR * geometry.reach
 
-    def copies(self, names: Sequence[str], source: Any, copy: Any) -> list[tuple[ti.Field, ti.Field, float]]:
-        """List field, copy, and what stands for nobody, of each scalar of the attributes `names` of two objects."""
+    def copies(self, names: Sequence[str], source: Any, copy: Any) -> list[tuple[ti.Field, ti.Field, float, int]]:
+        """List field, copy, what stands for nobody, and axis (-1 if not a position), of each scalar of `names` of two objects."""
         found = []
         for name in names:
             one, two = getattr(source, name), getattr(copy, name)
             if isinstance(one, ti.MatrixField):
-                nobody = self.far if name == "x" else 0.0
-                found += [(one.get_scalar_field(d), two.get_scalar_field(d), nobody) for d in range(one.n)]
+                place = name == "x"
+                found += [
+                    (one.get_scalar_field(d), two.get_scalar_field(d), self.far if place else 0.0, d if place else -1)
+                    for d in range(one.n)
+                ]
             else:
-                found.append((one, two, 1.0 if name == "rho" else 0.0))
+                found.append((one, two, 1.0 if name == "rho" else 0.0, -1))
         return found
 
     @ti.func
@@ -89,17 +92,33 @@ class Windows:
                     self.own_start[number + part] = n
                 cell = self.cell(row, column, above) + part
                 first, last = self.start[cell], self.start[cell + 1]
-                for field, copy, _ in ti.static(copies):
-                    for k in range(first, last):
-                        copy[n + k - first] = field[k]
+                for field, copy, _nobody, axis in ti.static(copies):
+                    if ti.static(axis >= 0 and self.geometry.periodic[axis]):
+                        middle, length = self.middle(row, column, above, axis), ti.static(self.geometry.lengths[axis])
+                        for k in range(first, last):  # the image that lies where the window does
+                            beside = field[k] - middle
+                            copy[n + k - first] = middle + beside - length * ti.floor(beside / length + 0.5)
+                    else:
+                        for k in range(first, last):
+                            copy[n + k - first] = field[k]
                 n += last - first
         return n
+
+    @ti.func
+    def middle(self, row, column, above, axis: ti.template()):
+        """Coordinate [m] along `axis` of the middle of a block, counted on beyond periodic faces."""
+        place = column
+        if ti.static(axis == 1):
+            place = row % self.geometry.shape[1] + above % 3 - 1
+        if ti.static(axis == 2):
+            place = row // self.geometry.shape[1] + above // 3 - 1
+        return self.geometry.lower[axis] + (place - MARGIN + 0.5) * self.geometry.sides[axis]
 
     @ti.func
     def close(self, copies: ti.template(), number, end):
         """Let nobody stand behind the last entry, so that loops may go on there."""
         self.column_start[number] = end
-        for _, copy, nobody in ti.static(copies):
+        for _field, copy, nobody, _axis in ti.static(copies):
             for n in range(end, end + VECTOR):
                 copy[n] = nobody
 
@@ -118,7 +137,9 @@ class FluidWindows(Windows):
     def __init__(self, near: Neighbourhood, grid: BlockGrid, per_block: float, backend: Backend, needs: Any) -> None:
         dim = grid.geometry.dim
         super().__init__(grid.geometry, grid.start, math.ceil(ROOM * 3 ** (dim - 1) * (RUN + 2) * per_block))
-        self.inside = Neighbourhood(self.entries, dim, backend, needs)
+        self.inside = Neighbourhood(
+            self.entries, dim, backend, needs
+        )  # whose positions are unrolled along periodic axes
 
 
 class WallWindows(Windows):

@@ -32,7 +32,7 @@ class ContinuityDensity(Density):
 
     def pairs(self, medium: Medium) -> tuple[Any, Any]:
         """Return m v_ij . grad W_ij at the middle of the step, and rho_0 V_b v_ib . grad W_ib for a wall."""
-        near, geometry = self.near, self.grid.geometry
+        near = self.near
         kernel, mass, rest_density, tiny = medium.kernel, medium.mass, medium.rest_density, medium.tiny
 
         @ti.func
@@ -44,7 +44,7 @@ class ContinuityDensity(Density):
 
         @ti.func
         def fluid_pair(near, i, j):
-            x_ij = geometry.difference(near.x[i], near.x[j])
+            x_ij = near.difference(i, j)
             return mass * compression(x_ij, near.v[i] - near.v[j], near.a[i] - near.a[j], near.elapsed[i])
 
         def wall_pair(wall: Any) -> Callable[..., Any]:

@@ -82,7 +82,6 @@ class SummationDensity(Density):
 
     def pairs(self, medium: Medium) -> tuple[Any, Any]:
         """Return m W_ij, and rho_0 V_b W_ib for a wall."""
-        geometry = self.grid.geometry
         kernel, mass, rest_density, tiny = medium.kernel, medium.mass, medium.rest_density, medium.tiny
 
         @ti.func
@@ -91,7 +90,7 @@ class SummationDensity(Density):
 
         @ti.func
         def fluid_pair(near, i, j):
-            return mass * value(geometry.difference(near.x[i], near.x[j]))
+            return mass * value(near.difference(i, j))
 
         def wall_pair(wall: Any) -> Any:
             @ti.func

@@ -98,8 +98,7 @@ class MomentumEquation:
     ) -> None:
         self.near = near
         self.gravity = gravity
-        geometry = grid.geometry
-        self.dim = dim = geometry.dim
+        self.dim = dim = grid.geometry.dim
         diffuses = diffusion is not None
         self.width = width = dim + int(with_rho_rate) + int(diffuses)
         kernel, mass, rest_density = medium.kernel, medium.mass, medium.rest_density
@@ -127,7 +126,7 @@ class MomentumEquation:
 
         @ti.func
         def fluid_pair(near, i, j):
-            x_ij, v_ij = geometry.difference(near.x[i], near.x[j]), near.v[i] - near.v[j]
+            x_ij, v_ij = near.difference(i, j), near.v[i] - near.v[j]
             d2 = x_ij.norm_sqr()
             rho = near.rho[i] + near.rho[j]
             along_x, along_v = pressure.fluid_pair(near, i, j, x_ij, v_ij, d2), 0.0
