@@ -1,4 +1,4 @@
-"""The command line: `taichi-rts run|compare|stability|scenes|info`."""
+"""The command line: `taichi-rts run|compare|stability|bench|scenes|info`."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import tyro
 
 import taichi_rts as rts
 from taichi_rts import backend, report
+from taichi_rts.benchmarks.command import Bench
 from taichi_rts.compare.command import Compare
 from taichi_rts.errors import CheckpointError, Error, OutputError, SimulationDivergedError
 from taichi_rts.extremes import Extremes
@@ -284,6 +285,7 @@ Command = (
     Annotated[Run, tyro.conf.subcommand("run")]
     | Annotated[Compare, tyro.conf.subcommand("compare")]
     | Annotated[Stability, tyro.conf.subcommand("stability")]
+    | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Scenes, tyro.conf.subcommand("scenes")]
     | Annotated[Info, tyro.conf.subcommand("info")]
 )

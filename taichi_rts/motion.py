@@ -145,95 +145,93 @@ class Motion:
                         self.near.viscosity[k] = self.particles.viscosity[i]
 
     @ti.kernel
-    def observe_walls(
-        self, due: ti.template(), due_count: ti.template(), read_at: ti.template(), now: ti.i32, tick: float
-    ):
-        """Note for every due particle where the moving walls are at its time."""
-        for n in range(due_count[None]):
-            k = due[n]
-            time = ti.cast(now + read_at[self.grid.block(self.grid.order[k])], float) * tick
+    def observe_walls(self, due: ti.template(), now: ti.i32, tick: float):
+        """Note for every particle that is due in the schedule `due` where the moving walls are at its time."""
+        for n in range(due.due_count[None]):
+            k = due.due[n]
+            time = ti.cast(now + due.read_at[self.grid.block(self.grid.order[k])], float) * tick
             for wall in ti.static(self.moving_walls):
                 wall.observe(k, time)
 
     @ti.kernel
-    def advance_due(
-        self, due: ti.template(), due_count: ti.template(), read_at: ti.template(), now: ti.i32, tick: float
-    ):
+    def advance_due(self, due: ti.template(), now: ti.i32, tick: float):
         """Lines 22-29: new acceleration of each due particle, then its corrected state, which holds from this time on."""
-        for n in range(due_count[None]):
-            k = due[n]
-            i = self.grid.order[k]
-            present = now + read_at[self.grid.block(i)]
-            dt = self.elapsed(i, present, tick)
-            a = self.particles.a[i]
-            time = ti.cast(present, float) * tick
-            by_walls = self.momentum.wall_rates(k)
-            rates = self.momentum.other_rates(k, time) + by_walls
-            a_new = a
+        self.momentum.sum.visit(self.advance, due, now, tick)
+
+    @ti.func
+    def advance(self, k, fluid, by_walls, due: ti.template(), now, tick):
+        """The same for the particle at place `k`, given the shares of the fluid and of the walls in its rates."""
+        i = self.grid.order[k]
+        present = now + due.read_at[self.grid.block(i)]
+        dt = self.elapsed(i, present, tick)
+        a = self.particles.a[i]
+        time = ti.cast(present, float) * tick
+        rates = self.momentum.other_rates(k, fluid, time) + by_walls
+        a_new = a
+        for d in ti.static(range(self.particles.dim)):
+            a_new[d] = rates[d]
+        if ti.static(self.particles.has_rho_rate):
+            self.particles.rho_rate[i] = rates[self.particles.dim]
+        if ti.static(self.integrates_density):
+            diffusion = rates[self.particles.dim + 1]
+            self.particles.rho[i] += (0.5 * dt) * (diffusion - self.particles.diffusion[i])
+            self.particles.diffusion[i] = diffusion
+            self.particles.rho_rate[i] += diffusion
+        power = 0.0  # [W/kg]
+        if ti.static(self.particles.has_budget and len(self.moving_walls) > 0):
+            power = self.momentum.wall_power(k)[0]
+        if ti.static(self.particles.has_guide):
+            if present < self.particles.guided_until[i]:
+                power = -a_new.dot(self.particles.v[i])
+                a_new = ti.zero(a)
+        x = self.integrator.correct_position(self.near.x[k], a, a_new, dt)
+        v = self.integrator.correct_velocity(self.particles.v[i], a, a_new, dt)
+        v, a_new = self.limit(v, self.largest_speed), self.limit(a_new, self.largest_acceleration)
+        finite = True  # of what was given too: a position that is not a number has been clamped to a corner by now
+        for d in ti.static(range(self.particles.dim)):
+            total = self.particles.x[i][d] + v[d] + a_new[d]
+            finite = finite and not (ti.math.isnan(total) or ti.math.isinf(total))
+        if not finite:
+            self.not_finite[None] += 1
+        inside = self.geometry.place(x)
+        v_free, v_face = v, ti.zero(v)
+        for wall in ti.static(self.faces):
+            held = wall.hold(inside, time)
+            if held[wall.axis] != inside[wall.axis]:
+                _displacement, v_face[wall.axis] = wall.motion(time)
+            inside = held
+        for d in ti.static(range(self.particles.dim)):
+            if ti.static(not self.geometry.periodic[d]):
+                if inside[d] != x[d]:
+                    self.stopped[None] += 1
+                    if (x[d] - inside[d]) * (v[d] - v_face[d]) > 0.0:
+                        v[d] = v_face[d]
+        for obstacle in ti.static(self.obstacles):
+            held, normal, v_surface = obstacle.hold(inside, time)
+            if normal.norm_sqr() > 0.0:
+                self.stopped_by_obstacles[None] += 1
+                inside = self.geometry.place(held)
+                v -= ti.min((v - v_surface).dot(normal), 0.0) * normal
+        if ti.static(self.particles.has_budget):
+            a_walls = a
             for d in ti.static(range(self.particles.dim)):
-                a_new[d] = rates[d]
-            if ti.static(self.particles.has_rho_rate):
-                self.particles.rho_rate[i] = rates[self.particles.dim]
-            if ti.static(self.integrates_density):
-                diffusion = rates[self.particles.dim + 1]
-                self.particles.rho[i] += (0.5 * dt) * (diffusion - self.particles.diffusion[i])
-                self.particles.diffusion[i] = diffusion
-                self.particles.rho_rate[i] += diffusion
-            power = 0.0  # [W/kg]
-            if ti.static(self.particles.has_budget and len(self.moving_walls) > 0):
-                power = self.momentum.wall_power(k)[0]
-            if ti.static(self.particles.has_guide):
-                if present < self.particles.guided_until[i]:
-                    power = -a_new.dot(self.particles.v[i])
-                    a_new = ti.zero(a)
-            x = self.integrator.correct_position(self.near.x[k], a, a_new, dt)
-            v = self.integrator.correct_velocity(self.particles.v[i], a, a_new, dt)
-            v, a_new = self.limit(v, self.largest_speed), self.limit(a_new, self.largest_acceleration)
-            finite = True  # of what was given too: a position that is not a number has been clamped to a corner by now
-            for d in ti.static(range(self.particles.dim)):
-                total = self.particles.x[i][d] + v[d] + a_new[d]
-                finite = finite and not (ti.math.isnan(total) or ti.math.isinf(total))
-            if not finite:
-                self.not_finite[None] += 1
-            inside = self.geometry.place(x)
-            v_free, v_face = v, ti.zero(v)
-            for wall in ti.static(self.faces):
-                held = wall.hold(inside, time)
-                if held[wall.axis] != inside[wall.axis]:
-                    _displacement, v_face[wall.axis] = wall.motion(time)
-                inside = held
-            for d in ti.static(range(self.particles.dim)):
-                if ti.static(not self.geometry.periodic[d]):
-                    if inside[d] != x[d]:
-                        self.stopped[None] += 1
-                        if (x[d] - inside[d]) * (v[d] - v_face[d]) > 0.0:
-                            v[d] = v_face[d]
-            for obstacle in ti.static(self.obstacles):
-                held, normal, v_surface = obstacle.hold(inside, time)
-                if normal.norm_sqr() > 0.0:
-                    self.stopped_by_obstacles[None] += 1
-                    inside = self.geometry.place(held)
-                    v -= ti.min((v - v_surface).dot(normal), 0.0) * normal
-            if ti.static(self.particles.has_budget):
-                a_walls = a
-                for d in ti.static(range(self.particles.dim)):
-                    a_walls[d] = by_walls[d]
-                if ti.static(self.particles.has_past):
-                    self.particles.past_wall_push[i] = self.particles.wall_push[i]
-                self.particles.wall_push[i] += (0.5 * dt) * (self.particles.a_walls[i] + a_walls) + v - v_free
-                self.particles.a_walls[i] = a_walls
-                self.particles.work[i] += (0.5 * dt) * (self.particles.power[i] + power)
-                self.particles.power[i] = power
+                a_walls[d] = by_walls[d]
             if ti.static(self.particles.has_past):
-                self.particles.past_x[i] = self.particles.x[i]
-                if ti.static(self.geometry.repeats):  # the image that lies beside the new position
-                    self.particles.past_x[i] = inside - self.geometry.difference(inside, self.particles.x[i])
-                self.particles.past_v[i] = self.particles.v[i]
-                self.particles.past_updated[i] = self.particles.updated[i]
-            self.particles.x[i] = inside
-            self.particles.v[i] = v
-            self.particles.a[i] = a_new
-            self.particles.updated[i] = present
+                self.particles.past_wall_push[i] = self.particles.wall_push[i]
+            self.particles.wall_push[i] += (0.5 * dt) * (self.particles.a_walls[i] + a_walls) + v - v_free
+            self.particles.a_walls[i] = a_walls
+            self.particles.work[i] += (0.5 * dt) * (self.particles.power[i] + power)
+            self.particles.power[i] = power
+        if ti.static(self.particles.has_past):
+            self.particles.past_x[i] = self.particles.x[i]
+            if ti.static(self.geometry.repeats):  # the image that lies beside the new position
+                self.particles.past_x[i] = inside - self.geometry.difference(inside, self.particles.x[i])
+            self.particles.past_v[i] = self.particles.v[i]
+            self.particles.past_updated[i] = self.particles.updated[i]
+        self.particles.x[i] = inside
+        self.particles.v[i] = v
+        self.particles.a[i] = a_new
+        self.particles.updated[i] = present
 
     @ti.kernel
     def export(

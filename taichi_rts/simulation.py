@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, cast
@@ -36,6 +37,7 @@ from taichi_rts.scene import Scene
 from taichi_rts.solids import distance_grid, make_solid
 from taichi_rts.stepping.base import Stepper
 from taichi_rts.stepping.regional import Regional
+from taichi_rts.windows import FluidWindows, WallWindows
 
 REORDER_EVERY = 32  # sorts between moving the state itself into the grid's order, for locality only
 COUNTER_LIMIT = 2**30  # counts on the device are 32-bit; they are collected before they can overflow
@@ -113,23 +115,32 @@ class Simulation:
         if self.sound:
             law = FloatingReference(self.medium.equation_of_state, self.particles, self.sound)
             self.medium = dataclasses.replace(self.medium, equation_of_state=law)
-        self.near = Neighbourhood(capacity, scene.dim, backend, needs)
+        self.near = Neighbourhood(capacity, scene.dim, backend, needs, geometry)
         self._obstacle_layers = start.obstacles
         self._meter: ForceMeter | None = None
         self.walls = make_walls(scene, start, self.near, self.grid, backend)
-        self.density = density(self.particles, self.near, self.grid, self.walls, self.medium, backend)
+        windows = None
+        if backend.arch == "cpu":
+            per_block = math.prod(geometry.sides) / scene.spacing**scene.dim
+            windows = FluidWindows(self.near, self.grid, per_block, backend, needs)
+            for wall in self.walls:
+                if not wall.moves and not geometry.repeats:  # whose images would need places of their own
+                    wall.windows = WallWindows(wall)
+        self.density = density(self.particles, self.near, self.grid, windows, self.walls, self.medium, backend)
         gravity = Gravity(scene)
         pressure = MirroredPressure(self.near, scene) if density.integrates else Pressure(self.near)
         momentum = MomentumEquation(
-            [pressure, *viscosity_terms(scene, self.medium, self.near)],
+            pressure,
+            viscosity_terms(scene, self.medium, self.near),
             self.near,
             self.grid,
+            windows,
             self.walls,
             self.medium,
             gravity,
             backend,
             with_rho_rate=self.particles.has_rho_rate,
-            diffusion=DensityDiffusion(self.near, self.medium, scene) if density.integrates else None,
+            diffusion=DensityDiffusion(self.medium, scene) if density.integrates else None,
         )
         self.motion = Motion(
             self.particles,
@@ -175,11 +186,10 @@ class Simulation:
             schedule.select(now, tick)  # lines 5-16
             self.motion.predict_neighbourhood(schedule.read_at, now, tick)  # lines 25-26, where somebody looks
         with self.overhead.due:
-            due = (schedule.due, schedule.due_count, schedule.read_at, now, tick)
             if self.motion.moving_walls:
-                self.motion.observe_walls(*due)
-            self.density.update(*due)  # lines 18-21
-            self.motion.advance_due(*due)  # lines 22-29
+                self.motion.observe_walls(schedule, now, tick)
+            self.density.update(schedule, now, tick)  # lines 18-21
+            self.motion.advance_due(schedule, now, tick)  # lines 22-29
         schedule.observe(now, tick)
 
     def _sort(self, now: int, tick: float) -> None:

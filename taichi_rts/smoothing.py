@@ -11,6 +11,12 @@ import numpy as np
 import taichi as ti
 
 
+@ti.func
+def positive(value):
+    """The larger of `value` and 0; an instruction shorter than max, which minds what is not a number."""
+    return ti.select(value > 0.0, value, 0.0)
+
+
 @ti.data_oriented
 class CubicSpline:
     """Cubic spline (Monaghan & Lattanzio 1985; Monaghan 1992): W = s (1/4 (2-q)^3+ - (1-q)^3+)."""
@@ -25,17 +31,20 @@ class CubicSpline:
     def value(self, d):
         """W [1/m^dim] at distance `d` [m]."""
         q = d * (1.0 / self.h)
-        outer = ti.max(2.0 - q, 0.0)
-        inner = ti.max(1.0 - q, 0.0)
+        outer, inner = positive(2.0 - q), positive(1.0 - q)
         return self.sigma * (0.25 * outer * outer * outer - inner * inner * inner)
+
+    @ti.func
+    def derivative(self, d):
+        """dW/dd [1/m^(dim+1)] at distance `d` [m]."""
+        q = d * (1.0 / self.h)
+        outer, inner = positive(2.0 - q), positive(1.0 - q)
+        return (3.0 * self.sigma / self.h) * (inner * inner - 0.25 * outer * outer)
 
     @ti.func
     def gradient_factor(self, d):
         """The factor (dW/dd)/d [1/m^(dim+2)] at distance `d` [m] > 0."""
-        q = d * (1.0 / self.h)
-        outer = ti.max(2.0 - q, 0.0)
-        inner = ti.max(1.0 - q, 0.0)
-        return (3.0 * self.sigma / self.h) * (inner * inner - 0.25 * outer * outer) / d
+        return self.derivative(d) / d
 
     def sample(self, d: Any) -> Any:
         """W [1/m^dim] for a NumPy array of distances [m]."""
@@ -57,14 +66,19 @@ class WendlandC2:
     def value(self, d):
         """W [1/m^dim] at distance `d` [m]."""
         q = d * (1.0 / self.h)
-        rest = ti.max(1.0 - 0.5 * q, 0.0)
+        rest = positive(1.0 - 0.5 * q)
         square = rest * rest
         return self.sigma * square * square * (2.0 * q + 1.0)
 
     @ti.func
+    def derivative(self, d):
+        """dW/dd [1/m^(dim+1)] at distance `d` [m]."""
+        return d * self.gradient_factor(d)
+
+    @ti.func
     def gradient_factor(self, d):
         """The factor (dW/dd)/d [1/m^(dim+2)] at distance `d` [m]; here it is finite at d = 0."""
-        rest = ti.max(1.0 - d * (0.5 / self.h), 0.0)
+        rest = positive(1.0 - d * (0.5 / self.h))
         return (-5.0 * self.sigma / (self.h * self.h)) * rest * rest * rest
 
     def sample(self, d: Any) -> Any:

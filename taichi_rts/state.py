@@ -23,9 +23,12 @@ class State:
     Attributes:
         fields: Taichi's fields, each once, under the first path that leads to it.
         owners: the attributes of each part that may change, by the part's path.
+
+    With `everything` also what is called transient.
     """
 
-    def __init__(self, root: Any) -> None:
+    def __init__(self, root: Any, *, everything: bool = False) -> None:
+        self._everything = everything
         self.fields: dict[str, Any] = {}
         self.owners: dict[str, dict[str, Any]] = {}
         self._skipped: dict[str, frozenset[str]] = {}
@@ -53,7 +56,7 @@ class State:
         elif isinstance(thing, dict):
             return [(join(path, str(number)), each) for number, each in enumerate(thing.values())]
         elif is_part(thing):
-            skipped = transient_names(type(thing))
+            skipped = frozenset() if self._everything else transient_names(type(thing))
             if not is_frozen(thing):
                 self.owners[path], self._skipped[path] = vars(thing), skipped
             return [(join(path, name), value) for name, value in vars(thing).items() if name not in skipped]

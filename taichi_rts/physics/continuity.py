@@ -27,11 +27,12 @@ class ContinuityDensity(Density):
     """
 
     integrates = True
+    reads = ("x", "v", "a", "elapsed")
     needs = frozenset({"rho_rate", "diffusion", "acceleration"})
 
     def pairs(self, medium: Medium) -> tuple[Any, Any]:
         """Return m v_ij . grad W_ij at the middle of the step, and rho_0 V_b v_ib . grad W_ib for a wall."""
-        near, geometry = self.near, self.grid.geometry
+        near = self.near
         kernel, mass, rest_density, tiny = medium.kernel, medium.mass, medium.rest_density, medium.tiny
 
         @ti.func
@@ -42,8 +43,8 @@ class ContinuityDensity(Density):
             return ti.Vector([kernel.gradient_factor(ti.sqrt(x.norm_sqr() + tiny)) * v.dot(x)])
 
         @ti.func
-        def fluid_pair(i, j):
-            x_ij = geometry.difference(near.x[i], near.x[j])
+        def fluid_pair(near, i, j):
+            x_ij = near.difference(i, j)
             return mass * compression(x_ij, near.v[i] - near.v[j], near.a[i] - near.a[j], near.elapsed[i])
 
         def wall_pair(wall: Any) -> Callable[..., Any]:
@@ -56,15 +57,10 @@ class ContinuityDensity(Density):
 
         return fluid_pair, wall_pair
 
-    @ti.kernel
-    def update(self, due: ti.template(), due_count: ti.template(), read_at: ti.template(), now: ti.i32, tick: float):
-        """Find density [kg/m^3] and p/rho^2 of the due particles, which stand at places `due[0 .. due_count]`."""
-        for n in range(due_count[None]):
-            k = due[n]
-            i = self.grid.order[k]
-            rate = self.sum_neighbours(k) + self.particles.diffusion[i]
-            rho = self.particles.rho[i] + self.near.elapsed[k] * rate
-            self.keep(k, i, rho, now + read_at[self.grid.block(i)], tick)
+    @ti.func
+    def found(self, i, k, total):
+        """Density at the end of the step."""
+        return self.particles.rho[i] + self.near.elapsed[k] * (total + self.particles.diffusion[i])
 
 
 @ti.data_oriented
@@ -84,9 +80,9 @@ class MirroredPressure(Pressure):
 
     @ti.func
     def wall_pair(self, i, b, x_ib, v_ib, d2, wall: ti.template()):
-        """Acceleration per unit of rho_0 V_b times the gradient factor."""
+        """Acceleration along x_ib per unit of rho_0 V_b times the gradient factor."""
         own = self.near.p_over_rho2[i]
-        return -(own + ti.max(own + ti.Vector(self.slope).dot(x_ib), 0.0)) * x_ib
+        return -(own + ti.max(own + ti.Vector(self.slope).dot(x_ib), 0.0))
 
 
 @ti.data_oriented
@@ -97,9 +93,8 @@ class DensityDiffusion:
     to rest under hydrostatic pressure (Fourtakas et al. 2019, Eq. 18, linearised). Where gravity changes, g is left out.
     """
 
-    def __init__(self, near: Neighbourhood, medium: Medium, scene: Scene) -> None:
+    def __init__(self, medium: Medium, scene: Scene) -> None:
         h = 0.5 * medium.support
-        self.near = near
         self.factor = 2.0 * DELTA * h * medium.sound_speed
         self.regular = 0.01 * h * h
         stiffness = 0.0 if scene.gravity_changes else medium.rest_density / medium.sound_speed**2
@@ -107,7 +102,7 @@ class DensityDiffusion:
         """Density gradient [kg/m^4] of water at rest, (dim,)."""
 
     @ti.func
-    def fluid_pair(self, i, j, x_ij, d2):
+    def fluid_pair(self, near: ti.template(), i, j, x_ij, d2):
         """Rate [kg/(m^3 s)] per unit of m times the gradient factor."""
-        excess = self.near.rho[i] - self.near.rho[j] - ti.Vector(self.hydrostatic).dot(x_ij)
-        return self.factor * excess * d2 / (self.near.rho[j] * (d2 + self.regular))
+        excess = near.rho[i] - near.rho[j] - ti.Vector(self.hydrostatic).dot(x_ij)
+        return self.factor * excess * d2 / (near.rho[j] * (d2 + self.regular))

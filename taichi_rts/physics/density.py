@@ -6,10 +6,10 @@ from typing import Any
 import taichi as ti
 
 from taichi_rts.backend import Backend
-from taichi_rts.grid import BlockGrid, make_neighbour_sum
+from taichi_rts.grid import BlockGrid
 from taichi_rts.particles import Neighbourhood, Particles
 from taichi_rts.physics.medium import Medium
-from taichi_rts.physics.walls import make_wall_sum
+from taichi_rts.windows import FluidWindows, NeighbourSum
 
 
 @ti.data_oriented
@@ -21,12 +21,15 @@ class Density:
 
     integrates = False
     needs: frozenset[str] = frozenset()
+    reads: tuple[str, ...] = ("x",)
+    """What pairs read of a `Neighbourhood`."""
 
     def __init__(
         self,
         particles: Particles,
         near: Neighbourhood,
         grid: BlockGrid,
+        windows: FluidWindows | None,
         walls: Sequence[Any],
         medium: Medium,
         backend: Backend,
@@ -37,22 +40,30 @@ class Density:
         self.equation_of_state = medium.equation_of_state
         self.keeps_past = particles.has_past
         fluid_pair, wall_pair = self.pairs(medium)
-        self.sum_fluid = make_neighbour_sum(grid.geometry, grid.start, fluid_pair, 1, backend)
-        self.sum_walls = make_wall_sum(walls, grid, wall_pair, 1, backend)
+        self.sum = NeighbourSum(
+            fluid_pair, wall_pair, 1, self.reads, ("x", "volume"), near, grid, windows, walls, backend
+        )
 
     def pairs(self, medium: Medium) -> tuple[Any, Any]:
-        """Return the ti.func `pair(i, j)` between fluid particles, and a function that makes one for a wall."""
+        """Return the ti.func `pair(near, i, j)` between fluid particles, and a function that makes one for a wall."""
         raise NotImplementedError
 
     @ti.func
-    def sum_neighbours(self, k):
-        """The sum over fluid and walls near the particle at place `k`."""
-        total = self.sum_fluid(k, self.near.x[k], self.grid.cell_of[self.grid.order[k]]) + self.sum_walls(k)
-        return total[0]
+    def found(self, i, k, total):
+        """Density [kg/m^3] of particle `i` at place `k`, from the `total` of its sum."""
+        raise NotImplementedError
+
+    @ti.kernel
+    def update(self, due: ti.template(), now: ti.i32, tick: float):
+        """Find density [kg/m^3] and p/rho^2 of the particles that are due in the schedule `due`."""
+        self.sum.visit(self.keep, due, now, tick)
 
     @ti.func
-    def keep(self, k, i, rho, present, tick):
-        """Give particle `i` at place `k` its density [kg/m^3] of tick `present`, and with it p/rho^2."""
+    def keep(self, k, fluid, walls, due: ti.template(), now, tick):
+        """Give the particle at place `k` the density that follows from the sums over `fluid` and `walls`, and with it p/rho^2."""
+        i = self.grid.order[k]
+        rho = self.found(i, k, fluid[0] + walls[0])
+        present = now + due.read_at[self.grid.block(i)]
         elapsed = ti.cast(present - self.particles.updated[i], float) * tick
         self.equation_of_state.adapt(i, self.grid.block(i), rho, elapsed)
         if ti.static(self.keeps_past):
@@ -71,7 +82,6 @@ class SummationDensity(Density):
 
     def pairs(self, medium: Medium) -> tuple[Any, Any]:
         """Return m W_ij, and rho_0 V_b W_ib for a wall."""
-        near, geometry = self.near, self.grid.geometry
         kernel, mass, rest_density, tiny = medium.kernel, medium.mass, medium.rest_density, medium.tiny
 
         @ti.func
@@ -79,8 +89,8 @@ class SummationDensity(Density):
             return ti.Vector([kernel.value(ti.sqrt(x_ij.norm_sqr() + tiny))])
 
         @ti.func
-        def fluid_pair(i, j):
-            return mass * value(geometry.difference(near.x[i], near.x[j]))
+        def fluid_pair(near, i, j):
+            return mass * value(near.difference(i, j))
 
         def wall_pair(wall: Any) -> Any:
             @ti.func
@@ -91,10 +101,7 @@ class SummationDensity(Density):
 
         return fluid_pair, wall_pair
 
-    @ti.kernel
-    def update(self, due: ti.template(), due_count: ti.template(), read_at: ti.template(), now: ti.i32, tick: float):
-        """Find density [kg/m^3] and p/rho^2 of the due particles, which stand at places `due[0 .. due_count]`."""
-        for n in range(due_count[None]):
-            k = due[n]
-            i = self.grid.order[k]
-            self.keep(k, i, self.sum_neighbours(k), now + read_at[self.grid.block(i)], tick)
+    @ti.func
+    def found(self, i, k, total):
+        """The sum itself."""
+        return total

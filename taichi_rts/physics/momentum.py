@@ -6,11 +6,12 @@ from typing import Any
 import taichi as ti
 
 from taichi_rts.backend import Backend
-from taichi_rts.grid import BlockGrid, make_neighbour_sum
+from taichi_rts.grid import BlockGrid
 from taichi_rts.particles import Neighbourhood
 from taichi_rts.physics.medium import Medium
 from taichi_rts.physics.walls import make_wall_sum
 from taichi_rts.scene import Scene
+from taichi_rts.windows import FluidWindows, NeighbourSum
 
 
 @ti.data_oriented
@@ -26,14 +27,14 @@ class Pressure:
         self.near = near
 
     @ti.func
-    def fluid_pair(self, i, j, x_ij, d2):
-        """Acceleration per unit of m times the gradient factor."""
-        return -(self.near.p_over_rho2[i] + self.near.p_over_rho2[j]) * x_ij
+    def fluid_pair(self, near: ti.template(), i, j, x_ij, v_ij, d2):
+        """Acceleration along x_ij per unit of m times the gradient factor."""
+        return -(near.p_over_rho2[i] + near.p_over_rho2[j])
 
     @ti.func
     def wall_pair(self, i, b, x_ib, v_ib, d2, wall: ti.template()):
-        """Acceleration per unit of rho_0 V_b times the gradient factor."""
-        return -self.near.p_over_rho2[i] * x_ib
+        """Acceleration along x_ib per unit of rho_0 V_b times the gradient factor."""
+        return -self.near.p_over_rho2[i]
 
 
 @ti.data_oriented
@@ -74,15 +75,19 @@ class MomentumEquation:
     vector of "rates": dv/dt [m/s^2], (dim,), with `with_rho_rate` then d rho/dt [kg/(m^3 s)], with a `diffusion` of the
     density, such as `DensityDiffusion`, that last.
 
-    A term is an object with two ti.funcs, `fluid_pair(i, j, x_ij, d2)` and `wall_pair(i, b, x_ib, v_ib, d2, wall)`, that
-    return the acceleration per unit of mass times gradient factor (see `smoothing`), as a vector.
+    Pressure acts along x_ij; viscosity terms act along x_ij or v_ij, as their `along` says, and share the denominator
+    (rho_i + rho_j) (|x_ij|^2 + 0.01 h^2), so that a pair costs one division. A term has two ti.funcs, `fluid_pair(near, i, j,
+    x_ij, v_ij, d2)` and `wall_pair(i, b, x_ib, v_ib, d2, wall)`, which return its coefficient per unit of mass times gradient
+    factor (see `smoothing`), a viscosity's times that denominator.
     """
 
     def __init__(
         self,
-        terms: Sequence[Any],
+        pressure: Pressure,
+        viscosities: Sequence[Any],
         near: Neighbourhood,
         grid: BlockGrid,
+        windows: FluidWindows | None,
         walls: Sequence[Any],
         medium: Medium,
         gravity: Gravity,
@@ -91,79 +96,98 @@ class MomentumEquation:
         with_rho_rate: bool = False,
         diffusion: Any = None,
     ) -> None:
-        self.grid = grid
         self.near = near
         self.gravity = gravity
-        geometry = grid.geometry
-        self.dim = dim = geometry.dim
+        self.dim = dim = grid.geometry.dim
         diffuses = diffusion is not None
         self.width = width = dim + int(with_rho_rate) + int(diffuses)
         kernel, mass, rest_density = medium.kernel, medium.mass, medium.rest_density
-        tiny = medium.tiny
-        terms = list(terms)
+        tiny, regular = medium.tiny, medium.regular
+        straight = [term for term in viscosities if term.along == "x"]
+        sideways = [term for term in viscosities if term.along == "v"]
 
         @ti.func
-        def rates(acceleration, v_ij, x_ij):
-            """Put the contribution to the density's rate, per unit of gradient factor, behind the acceleration."""
+        def rates(along_x, along_v, x_ij, v_ij, d2, rho):
+            """Rates per unit of mass, but for a diffusion's, which is 0 here; `rho` is rho_i + rho_j."""
+            d = ti.sqrt(d2 + tiny)
+            factor = 0.0
+            if ti.static(len(viscosities) > 0):
+                factor = kernel.derivative(d) / (d * rho * (d2 + regular))
+            else:
+                factor = kernel.gradient_factor(d)
             result = ti.Vector.zero(backend.dtype, width)
-            for d in ti.static(range(dim)):
-                result[d] = acceleration[d]
+            for e in ti.static(range(dim)):
+                result[e] = factor * along_x * x_ij[e]
+                if ti.static(len(sideways) > 0):
+                    result[e] += factor * along_v * v_ij[e]
             if ti.static(width > dim):
-                result[dim] = v_ij.dot(x_ij)
+                result[dim] = kernel.gradient_factor(d) * v_ij.dot(x_ij)
             return result
 
         @ti.func
-        def fluid_pair(i, j):
-            x_ij = geometry.difference(near.x[i], near.x[j])
+        def fluid_pair(near, i, j):
+            x_ij, v_ij = near.difference(i, j), near.v[i] - near.v[j]
             d2 = x_ij.norm_sqr()
-            acceleration = ti.Vector.zero(backend.dtype, dim)
-            for term in ti.static(terms):
-                acceleration += term.fluid_pair(i, j, x_ij, d2)
-            result = rates(acceleration, near.v[i] - near.v[j], x_ij)
+            rho = near.rho[i] + near.rho[j]
+            along_x, along_v = pressure.fluid_pair(near, i, j, x_ij, v_ij, d2), 0.0
+            if ti.static(len(viscosities) > 0):
+                along_x *= rho * (d2 + regular)
+            for term in ti.static(straight):
+                along_x += term.fluid_pair(near, i, j, x_ij, v_ij, d2)
+            for term in ti.static(sideways):
+                along_v += term.fluid_pair(near, i, j, x_ij, v_ij, d2)
+            result = rates(along_x, along_v, x_ij, v_ij, d2, rho)
             if ti.static(diffuses):
-                result[width - 1] = diffusion.fluid_pair(i, j, x_ij, d2)
-            return mass * kernel.gradient_factor(ti.sqrt(d2 + tiny)) * result
+                spread = kernel.gradient_factor(ti.sqrt(d2 + tiny))
+                result[width - 1] = spread * diffusion.fluid_pair(near, i, j, x_ij, d2)
+            return mass * result
 
         @ti.func
         def push(i, b, wall: ti.template()):
-            """Difference of places and velocities, acceleration per unit of factor, and the factor, of a wall particle."""
+            """Rates due to a wall particle, as those of a fluid particle of the same density."""
             x_ib, v_ib = wall.difference(i, b), wall.relative_velocity(i, b)
             d2 = x_ib.norm_sqr()
-            acceleration = ti.Vector.zero(backend.dtype, dim)
-            for term in ti.static(terms):
-                acceleration += term.wall_pair(i, b, x_ib, v_ib, d2, wall)
-            return x_ib, v_ib, acceleration, rest_density * wall.volume[b] * kernel.gradient_factor(ti.sqrt(d2 + tiny))
+            rho = 2.0 * near.rho[i]
+            along_x, along_v = pressure.wall_pair(i, b, x_ib, v_ib, d2, wall), 0.0
+            if ti.static(len(viscosities) > 0):
+                along_x *= rho * (d2 + regular)
+            for term in ti.static(straight):
+                along_x += term.wall_pair(i, b, x_ib, v_ib, d2, wall)
+            for term in ti.static(sideways):
+                along_v += term.wall_pair(i, b, x_ib, v_ib, d2, wall)
+            return rest_density * wall.volume[b] * rates(along_x, along_v, x_ib, v_ib, d2, rho)
 
         def wall_pair(wall: Any) -> Any:
             @ti.func
             def pair(i, b):
-                x_ib, v_ib, acceleration, factor = push(i, b, wall)
-                return factor * rates(acceleration, v_ib, x_ib)
+                return push(i, b, wall)
 
             return pair
 
         def power_pair(wall: Any) -> Any:
             @ti.func
             def pair(i, b):
-                _x_ib, v_ib, acceleration, factor = push(i, b, wall)
-                return ti.Vector([factor * acceleration.dot(near.v[i] - v_ib)])
+                pushed, v_b = push(i, b, wall), near.v[i] - wall.relative_velocity(i, b)
+                power = 0.0
+                for e in ti.static(range(dim)):
+                    power += pushed[e] * v_b[e]
+                return ti.Vector([power])
 
             return pair
 
         self.wall_pair = wall_pair
         self.moving = [wall for wall in walls if wall.moves]
-        self.sum_fluid = make_neighbour_sum(geometry, grid.start, fluid_pair, width, backend)
-        self.wall_rates = make_wall_sum(walls, grid, wall_pair, width, backend)
-        """The walls' share of the rates, (width,), of the particle at a place."""
+        names = ["x", "v", "rho", "p_over_rho2", *(["viscosity"] if near.has_viscosity else [])]
+        wall_names = ["x", "volume", *(["normal"] if sideways else [])]
+        self.sum = NeighbourSum(fluid_pair, wall_pair, width, names, wall_names, near, grid, windows, walls, backend)
         self.wall_power = make_wall_sum(self.moving, grid, power_pair, 1, backend)
         """Power [W/kg] of moving walls on the particle at a place, (1,): their accelerations times their velocities."""
 
     @ti.func
-    def other_rates(self, k, time):
-        """All but the walls' share of the rates, (width,), of the particle at place `k` at `time` [s]."""
-        x = self.near.x[k]
-        total = self.sum_fluid(k, x, self.grid.cell_of[self.grid.order[k]])
-        outer = self.gravity.acceleration(x, time)
+    def other_rates(self, k, fluid, time):
+        """All but the walls' share of the rates, (width,), of the particle at place `k` at `time` [s]; `fluid`: the fluid's."""
+        total = fluid
+        outer = self.gravity.acceleration(self.near.x[k], time)
         for d in ti.static(range(self.dim)):
             total[d] += outer[d]
         return total

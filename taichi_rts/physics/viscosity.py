@@ -1,4 +1,7 @@
-"""Viscosity terms of the momentum equation; a scene that sets neither compiles neither."""
+"""Viscosity terms of the momentum equation; a scene that sets neither compiles neither.
+
+They leave out their common denominator, (rho_i + rho_j) (|x_ij|^2 + 0.01 h^2): see `MomentumEquation`.
+"""
 
 from typing import Any
 
@@ -17,22 +20,23 @@ class ArtificialViscosity:
     centres, so it damps collisions with walls and lets fluid slip along them.
     """
 
-    def __init__(self, near: Neighbourhood, alpha: float, h: float, sound_speed: float) -> None:
-        self.near = near
+    along = "x"
+
+    def __init__(self, alpha: float, h: float, sound_speed: float) -> None:
         self.factor = 2.0 * alpha * h * sound_speed
-        self.regular = 0.01 * h * h
 
     @ti.func
-    def fluid_pair(self, i, j, x_ij, d2):
-        """Acceleration per unit of m times the gradient factor."""
-        approach = ti.min((self.near.v[i] - self.near.v[j]).dot(x_ij), 0.0)
-        return self.factor * approach / ((self.near.rho[i] + self.near.rho[j]) * (d2 + self.regular)) * x_ij
+    def fluid_pair(self, near: ti.template(), i, j, x_ij, v_ij, d2):
+        """Coefficient of x_ij."""
+        approach = v_ij.dot(x_ij)
+        return self.factor * ti.select(
+            approach < 0.0, approach, 0.0
+        )  # quicker than min, which minds what is not a number
 
     @ti.func
     def wall_pair(self, i, b, x_ib, v_ib, d2, wall: ti.template()):
         """The same against a wall, which has the particle's density."""
-        approach = ti.min(v_ib.dot(x_ib), 0.0)
-        return 0.5 * self.factor * approach / (self.near.rho[i] * (d2 + self.regular)) * x_ib
+        return self.fluid_pair(self, i, b, x_ib, v_ib, d2)
 
 
 @ti.data_oriented
@@ -43,34 +47,33 @@ class LaminarViscosity:
     2 nu_i nu_j / (nu_i + nu_j), which keeps the stress continuous (Cleary & Monaghan 1999); `nu` is then None.
     """
 
-    def __init__(self, near: Neighbourhood, nu: float | None, h: float) -> None:
+    along = "v"
+
+    def __init__(self, near: Neighbourhood, nu: float | None) -> None:
         self.near = near
-        self.nu = nu
+        self.nu: Any = nu
         self.differs = nu is None
-        self.regular = 0.01 * h * h
 
     @ti.func
-    def nu_between(self, i, j):
+    def nu_between(self, near: ti.template(), i, j):
         """Viscosity [m^2/s] between the particles at places `i` and `j`."""
         nu = 0.0
         if ti.static(self.differs):
-            one, two = self.near.viscosity[i], self.near.viscosity[j]
+            one, two = near.viscosity[i], near.viscosity[j]
             nu = 2.0 * one * two / ti.max(one + two, 1e-30)
         else:
             nu = self.nu
         return nu
 
     @ti.func
-    def fluid_pair(self, i, j, x_ij, d2):
-        """Acceleration per unit of m times the gradient factor."""
-        scale = 4.0 * self.nu_between(i, j) * d2 / ((self.near.rho[i] + self.near.rho[j]) * (d2 + self.regular))
-        return scale * (self.near.v[i] - self.near.v[j])
+    def fluid_pair(self, near: ti.template(), i, j, x_ij, v_ij, d2):
+        """Coefficient of v_ij."""
+        return 4.0 * self.nu_between(near, i, j) * d2
 
     @ti.func
     def wall_pair(self, i, b, x_ib, v_ib, d2, wall: ti.template()):
         """The same against a wall, which has the particle's density and viscosity, with no slip on its face."""
-        scale = 2.0 * self.nu_between(i, i) * d2 / (self.near.rho[i] * (d2 + self.regular))
-        return scale * wall.shear(i, b, x_ib) * v_ib
+        return 4.0 * self.nu_between(self.near, i, i) * d2 * wall.shear(i, b, x_ib)
 
 
 def viscosity_terms(scene: Scene, medium: Medium, near: Neighbourhood) -> list[Any]:
@@ -78,8 +81,8 @@ def viscosity_terms(scene: Scene, medium: Medium, near: Neighbourhood) -> list[A
     h = 0.5 * medium.support
     terms: list[Any] = []
     if scene.artificial_viscosity > 0.0:
-        terms.append(ArtificialViscosity(near, scene.artificial_viscosity, h, scene.viscous_wave_speed))
+        terms.append(ArtificialViscosity(scene.artificial_viscosity, h, scene.viscous_wave_speed))
     if max(scene.viscosities) > 0.0:
         same = len(set(scene.viscosities)) == 1
-        terms.append(LaminarViscosity(near, scene.viscosities[0] if same else None, h))
+        terms.append(LaminarViscosity(near, scene.viscosities[0] if same else None))
     return terms

@@ -8,6 +8,7 @@ Akinci's V_b = 1 / sum_k W_bk makes up for what a single layer lacks, seen from 
 `sampling.calibrate_walls` works it out as seen from fluid at rest on them.
 """
 
+import copy
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -30,12 +31,14 @@ class Walls:
     """
 
     moves = False
-    transient = frozenset({"x", "volume", "normal", "depth", "stiffness", "start", "near", "shift", "speed"})
+    transient = frozenset({"x", "volume", "normal", "depth", "stiffness", "start", "near", "shift", "speed", "windows"})
 
     def __init__(self, layer: WallLayer, fluid: Neighbourhood, geometry: Geometry, backend: Backend) -> None:
         positions, volumes = layer.positions, layer.volumes
         self.fluid = fluid
         self.geometry = geometry
+        self.dtype = backend.dtype
+        self.windows: Any = None  # see `windows.py`
         self.count = len(positions)
         cell = geometry.cell_numpy(positions)
         order = np.argsort(cell, kind="stable")
@@ -55,6 +58,13 @@ class Walls:
         self.normal.from_numpy(np.pad(layer.normals[order], ((0, pad), (0, 0))).astype(backend.numpy_dtype))
         self.start.from_numpy(start.astype(np.int32))
         self.near.from_numpy(near.astype(np.int32))
+
+    def room_for(self, count: int) -> "Walls":
+        """Return the same with room for `count` particles, none of which is there yet."""
+        other = copy.copy(self)
+        other.x, other.normal = (vector_field(self.geometry.dim, self.dtype, count) for _ in range(2))
+        other.volume = ti.field(self.dtype, count)
+        return other
 
     @ti.func
     def seen_from(self, k, cell):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any, ClassVar, Protocol
 
 import taichi as ti
 from pydantic import Field
@@ -18,7 +18,7 @@ Courant = Annotated[float, Field(gt=0, le=2)]
 class Stepper(Protocol):
     """A stepper's parameters, and how they become a schedule for one run. To add one, write one file like `uniform.py`."""
 
-    name: str
+    name: ClassVar[str]
 
     @property
     def follows_sound(self) -> bool:
@@ -51,7 +51,8 @@ class Schedule:
     """Who is due in the present step.
 
     Attributes:
-        due: places (in the grid's order) of the due particles, ascending; `due_count` of them.
+        due: places (in the grid's order) of the due particles, ascending; `due_count` of them. Those of a block are
+            `due[due_start[block]]` and its `block_due[block]` - 1 successors.
         read_at: for each block the time at which due particles may read its particles, in ticks after `now`; negative
             where none does.
         base_ticks: ticks in one base step.
@@ -80,6 +81,11 @@ class Schedule:
         self.read_at = ti.field(ti.i32, grid.geometry.blocks)
         self.steps = 0
         self.debug = False
+
+    @ti.func
+    def due_in(self, block):
+        """First entry of `due` that lies in `block`, and one past the last."""
+        return self.due_start[block], self.due_start[block] + self.block_due[block]
 
     def begin(self, timeline: Timeline, target: int) -> bool:
         """Set the clock to the next step and return True, unless that step ends after tick `target`.

@@ -83,6 +83,11 @@ class UniformSchedule(Schedule):
         for k in self.due:
             self.due[k] = k
 
+    @ti.func
+    def due_in(self, block):
+        """All of the block."""
+        return self.grid.first(block), self.grid.first(block + 1)
+
 
 @ti.data_oriented
 class AdaptiveSchedule(UniformSchedule):

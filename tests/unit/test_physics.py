@@ -69,9 +69,9 @@ def test_specific_energy_is_the_integral_of_p_over_rho_squared():
 def test_pressure_force_is_the_slope_of_the_internal_energy_walls_included(taichi_cpu_f64, dim, monkeypatch):
     built = SimpleNamespace(terms=None)
 
-    def watch(terms, *others, **options):
-        built.terms = terms
-        return MomentumEquation(terms, *others, **options)
+    def watch(pressure, viscosities, *others, **options):
+        built.terms = [pressure, *viscosities]
+        return MomentumEquation(pressure, viscosities, *others, **options)
 
     monkeypatch.setattr(simulation, "MomentumEquation", watch)
     scene = make_scene(dim)

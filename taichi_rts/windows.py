@@ -1,0 +1,301 @@
+"""Sums over all neighbours of the due particles: the inner loops of the solver, one way for CPUs and one for GPUs.
+
+On a GPU a thread has a particle and walks over the rows of cells around it. On a CPU a thread has a run of blocks along x. It
+gathers what lies in them and around them into a window: the nine rows of blocks (three in two dimensions) that surround the run,
+column of cells by column of cells, one array for each quantity. What lies near a particle is then one contiguous range, over
+which LLVM makes vector instructions with a single sum at the end (docs/speed.md has the figures).
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+from taichi_rts.backend import Backend
+from taichi_rts.grid import CELLS_PER_BLOCK, MARGIN, BlockGrid, Geometry, make_neighbour_sum
+from taichi_rts.particles import Neighbourhood
+from taichi_rts.physics.walls import make_wall_sum
+
+TASKS = 64  # windows, and shares of the blocks that threads take one by one
+RUN = 8  # most blocks that share a window
+VECTOR = 16  # loops go on to a multiple of it; who lies there is too far away to count
+ROOM = 1.5  # of a window, over what lies around a run of blocks at rest
+FAR = 1e3  # distance over the support radius of those behind the last
+
+
+@ti.data_oriented
+class Windows:
+    """`TASKS` windows on what `start` has sorted into cells; each has room for `capacity` entries."""
+
+    transient = frozenset({"start", "column_start", "own_start"})
+
+    def __init__(self, geometry: Geometry, start: ti.Field, capacity: int) -> None:
+        self.geometry = geometry
+        self.start = start
+        self.rows = 3 ** (geometry.dim - 1)
+        self.capacity = capacity
+        self.size = capacity + VECTOR
+        self.entries = TASKS * self.size
+        self.columns = (RUN + 2) * CELLS_PER_BLOCK + 1
+        self.column_start = ti.field(ti.i32, TASKS * self.columns)
+        """First entry of each column of a window; the next one's ends it."""
+        self.own_start = ti.field(ti.i32, TASKS * self.columns)
+        """First entry of those in the run's own row."""
+        self.far = geometry.upper[0] + FAR * geometry.reach
+
+    def copies(self, names: Sequence[str], source: Any, copy: Any) -> list[tuple[ti.Field, ti.Field, float, int]]:
+        """List field, copy, what stands for nobody, and axis (-1 if not a position), of each scalar of `names` of two objects."""
+        found = []
+        for name in names:
+            one, two = getattr(source, name), getattr(copy, name)
+            if isinstance(one, ti.MatrixField):
+                place = name == "x"
+                found += [
+                    (one.get_scalar_field(d), two.get_scalar_field(d), self.far if place else 0.0, d if place else -1)
+                    for d in range(one.n)
+                ]
+            else:
+                found.append((one, two, 1.0 if name == "rho" else 0.0, -1))
+        return found
+
+    @ti.func
+    def cell(self, row, column, above):
+        """First cell of the block at `column` [blocks] in the row of blocks number `above` (0-8) of those around `row`."""
+        place = column
+        if ti.static(self.geometry.periodic[0]):
+            if place < MARGIN:
+                place += self.geometry.inside[0]
+            elif place >= MARGIN + self.geometry.inside[0]:
+                place -= self.geometry.inside[0]
+        other = self.geometry.row_beside(row, above % 3 - 1, above // 3 - 1)
+        return other * self.geometry.row_length + place * CELLS_PER_BLOCK
+
+    @ti.func
+    def count(self, row, column):
+        """Number of particles in the blocks at `column` in all rows around `row`."""
+        total = 0
+        for above in range(self.rows):
+            cell = self.cell(row, column, above)
+            total += self.start[cell + CELLS_PER_BLOCK] - self.start[cell]
+        return total
+
+    @ti.func
+    def gather(self, copies: ti.template(), row, column, number, begin):
+        """Copy who lies in the blocks at `column` to entry `begin` and on, as the columns `number` and on; return the end."""
+        n = begin
+        for part in range(CELLS_PER_BLOCK):
+            self.column_start[number + part] = n
+            for above in range(self.rows):
+                if above == self.rows // 2:
+                    self.own_start[number + part] = n
+                cell = self.cell(row, column, above) + part
+                first, last = self.start[cell], self.start[cell + 1]
+                for field, copy, _nobody, axis in ti.static(copies):
+                    if ti.static(axis >= 0 and self.geometry.periodic[axis]):
+                        middle, length = self.middle(row, column, above, axis), ti.static(self.geometry.lengths[axis])
+                        for k in range(first, last):  # the image that lies where the window does
+                            beside = field[k] - middle
+                            copy[n + k - first] = middle + beside - length * ti.floor(beside / length + 0.5)
+                    else:
+                        for k in range(first, last):
+                            copy[n + k - first] = field[k]
+                n += last - first
+        return n
+
+    @ti.func
+    def middle(self, row, column, above, axis: ti.template()):
+        """Coordinate [m] along `axis` of the middle of a block, counted on beyond periodic faces."""
+        place = column
+        if ti.static(axis == 1):
+            place = row % self.geometry.shape[1] + above % 3 - 1
+        if ti.static(axis == 2):
+            place = row // self.geometry.shape[1] + above // 3 - 1
+        return self.geometry.lower[axis] + (place - MARGIN + 0.5) * self.geometry.sides[axis]
+
+    @ti.func
+    def close(self, copies: ti.template(), number, end):
+        """Let nobody stand behind the last entry, so that loops may go on there."""
+        self.column_start[number] = end
+        for _field, copy, nobody, _axis in ti.static(copies):
+            for n in range(end, end + VECTOR):
+                copy[n] = nobody
+
+    @ti.func
+    def near(self, number):
+        """First and last entry + 1 of those near a particle in column `number`, up to a multiple of `VECTOR`."""
+        low, high = self.column_start[number - CELLS_PER_BLOCK], self.column_start[number + CELLS_PER_BLOCK + 1]
+        return low, low + (high - low + (VECTOR - 1)) // VECTOR * VECTOR
+
+
+class FluidWindows(Windows):
+    """Windows on the fluid: entries of the `Neighbourhood` `inside`; `per_block` is how many particles a block holds at rest."""
+
+    transient = frozenset({"inside"})
+
+    def __init__(self, near: Neighbourhood, grid: BlockGrid, per_block: float, backend: Backend, needs: Any) -> None:
+        dim = grid.geometry.dim
+        super().__init__(grid.geometry, grid.start, math.ceil(ROOM * 3 ** (dim - 1) * (RUN + 2) * per_block))
+        self.inside = Neighbourhood(
+            self.entries, dim, backend, needs
+        )  # whose positions are unrolled along periodic axes
+
+
+class WallWindows(Windows):
+    """Windows on the particles of a wall at rest, `inside`."""
+
+    transient = frozenset({"inside"})
+
+    def __init__(self, wall: Any) -> None:
+        geometry = wall.geometry
+        counts = np.diff(wall.start.to_numpy()[::CELLS_PER_BLOCK]).reshape(geometry.shape[::-1])
+        for axis in range(geometry.dim - 1):
+            counts = counts + np.roll(counts, 1, axis) + np.roll(counts, -1, axis)
+        super().__init__(geometry, wall.start, int(counts.max()) * (RUN + 2))
+        self.inside = wall.room_for(self.entries)
+
+
+@ti.data_oriented
+class NeighbourSum:
+    """Sums of `pair(near, i, j)` over the fluid near each due particle, and of `make_wall_pair(wall)(k, b)` over all walls.
+
+    Both are vectors of `width`. `near` is where i and j are to be read: `Neighbourhood` itself, or a window of it; `names` lists
+    the quantities that `pair` reads there, `wall_names` those that wall pairs read of a wall. Pairs beyond the support are
+    offered too, so they must vanish there by themselves.
+    """
+
+    def __init__(
+        self,
+        pair: Callable[..., Any],
+        make_wall_pair: Callable[[Any], Callable[..., Any]],
+        width: int,
+        names: Sequence[str],
+        wall_names: Sequence[str],
+        near: Neighbourhood,
+        grid: BlockGrid,
+        windows: FluidWindows | None,
+        walls: Sequence[Any],
+        backend: Backend,
+    ) -> None:
+        self.width = width
+        self.near = near
+        self.grid = grid
+        self.pair = pair
+        self.dtype = backend.dtype
+        self.by_windows = windows is not None
+        self.still = [wall for wall in walls if wall.windows is not None]
+        """The wall at rest, if it has windows."""
+        if windows is not None:
+            self.windows = windows
+            self.copies = windows.copies(names, near, windows.inside)
+        for wall in self.still:
+            self.wall = wall
+            self.wall_copies = wall.windows.copies(wall_names, wall, wall.windows.inside)
+            self.wall_pair = make_wall_pair(wall.windows.inside)
+
+        @ti.func
+        def pair_here(i, j):
+            return pair(near, i, j)
+
+        self.plain_fluid = make_neighbour_sum(grid.geometry, grid.start, pair_here, width, backend)
+        others = [wall for wall in walls if wall not in self.still]
+        self.other_walls = make_wall_sum(others, grid, make_wall_pair, width, backend)
+
+    @ti.func
+    def visit(self, finish: ti.template(), due: ti.template(), now, tick):
+        """Call `finish(k, fluid, walls, due, now, tick)` with both sums for the place k of each due particle of schedule `due`.
+
+        To be called at the outermost level of a kernel, where its loops run in parallel.
+        """
+        if ti.static(not self.by_windows):
+            for n in range(due.due_count[None]):
+                k = due.due[n]
+                finish(k, self.plain(k), self.other_walls(k), due, now, tick)
+        else:
+            for task in range(TASKS):
+                blocks = self.grid.geometry.blocks
+                block, end = self.share(task, blocks), self.share(task + 1, blocks)
+                while block < end:
+                    first, last = due.due_in(block)
+                    if first < last:
+                        block = self.visit_run(finish, due, now, tick, task, block, end)
+                    else:
+                        block += 1
+
+    @ti.func
+    def share(self, task, blocks):
+        """First block of a task."""
+        return ti.cast(ti.cast(task, ti.i64) * blocks // TASKS, ti.i32)
+
+    @ti.func
+    def plain(self, k):
+        """The fluid's sum for the particle at place `k`, without a window."""
+        return self.plain_fluid(k, self.near.x[k], self.grid.cell_of[self.grid.order[k]])
+
+    @ti.func
+    def visit_run(self, finish: ti.template(), due: ti.template(), now, tick, task, block, end):
+        """Visit the due particles of `block` and of the blocks behind it as far as a window reaches; return who comes next."""
+        row, column = block // self.grid.geometry.shape[0], block % self.grid.geometry.shape[0]
+        held = self.open(due, task, row, column, end - block)
+        done = ti.max(held - 2, 1)
+        number = task * self.windows.columns
+        for ahead in range(done):
+            first, last = due.due_in(block + ahead)
+            cell = (block + ahead) * CELLS_PER_BLOCK
+            local = number + (ahead + 1) * CELLS_PER_BLOCK
+            for m in range(first, last):
+                k = due.due[m]
+                while k >= self.grid.start[cell + 1]:
+                    cell += 1
+                    local += 1
+                fluid = ti.Vector.zero(self.dtype, self.width)
+                if held >= 3:
+                    i = self.windows.own_start[local] + k - self.grid.start[cell]
+                    low, high = self.windows.near(local)
+                    for j in range(low, high):
+                        fluid += self.pair(self.windows.inside, i, j)
+                else:  # a run that has blown up: too many in too little space
+                    fluid = self.plain(k)
+                walls = self.other_walls(k)
+                if ti.static(len(self.still) > 0):
+                    if self.wall.near[block + ahead] == 1:
+                        low, high = self.wall.windows.near(local)
+                        for b in range(low, high):
+                            walls += self.wall_pair(k, b)
+                finish(k, fluid, walls, due, now, tick)
+        return block + done
+
+    @ti.func
+    def open(self, due: ti.template(), task, row, column, most):
+        """Gather who lies around the run of at most `most` blocks in which somebody is due, from `column` of `row` on.
+
+        Return the number of columns [blocks] gathered, from that before the run to that behind it; fewer than 3 if the fluid
+        around a single block does not fit.
+        """
+        base, number = task * self.windows.size, task * self.windows.columns
+        n, held = base, 0
+        most = ti.min(most, ti.min(RUN, self.grid.geometry.shape[0] - 1 - column))
+        fits = True
+        while fits:
+            n = self.windows.gather(self.copies, row, column - 1 + held, number + held * CELLS_PER_BLOCK, n)
+            held += 1
+            fits = held < 3
+            if held >= 3 and held - 2 < most:
+                first, last = due.due_in(row * self.grid.geometry.shape[0] + column + held - 2)
+                fits = first < last
+            if fits:
+                fits = n - base + self.windows.count(row, column - 1 + held) <= self.windows.capacity
+        self.windows.close(self.copies, number + held * CELLS_PER_BLOCK, n)
+        if ti.static(len(self.still) > 0):
+            some = 0
+            for ahead in range(ti.max(held - 2, 1)):
+                some += self.wall.near[row * self.grid.geometry.shape[0] + column + ahead]
+            if some > 0:
+                m = task * self.wall.windows.size
+                for side in range(ti.max(held, 3)):
+                    m = self.wall.windows.gather(
+                        self.wall_copies, row, column - 1 + side, number + side * CELLS_PER_BLOCK, m
+                    )
+                self.wall.windows.close(self.wall_copies, number + ti.max(held, 3) * CELLS_PER_BLOCK, m)
+        return held
