@@ -1,7 +1,7 @@
 """Spatially varying time stepping for weakly compressible SPH, on Taichi. Importing starts nothing; call `init`."""
 
 from taichi_rts.backend import init
-from taichi_rts.conditions import GravityChange, Inflow, MovingWall
+from taichi_rts.conditions import GravityChange, Inflow, MovingWall, Outlet
 from taichi_rts.diagnostics import Energy
 from taichi_rts.errors import (
     BackendError,
@@ -59,6 +59,7 @@ __all__ = [
     "LinearField",
     "MeshObstacle",
     "MovingWall",
+    "Outlet",
     "OutputError",
     "ParticleFrame",
     "Particles",

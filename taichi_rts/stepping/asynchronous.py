@@ -189,6 +189,10 @@ class AsynchronousSchedule(Cells):
             self.blind -= 1
             return self.launch(False)
         youngest = int(self.youngest[None])
+        if (
+            youngest == self.EMPTY
+        ):  # outlets have taken out all; what an inflow still brings comes when the grid is sorted
+            youngest = self.cycle_end
         if youngest > target:
             self.steps = max(self.steps, target)
             return False
