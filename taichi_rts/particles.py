@@ -23,9 +23,10 @@ def vector_field(dim: int, dtype: Any, count: int) -> ti.MatrixField:
 class Particles:
     """Struct-of-arrays fields, (capacity,) each; positions x [m], velocities v [m/s], accelerations a [m/s^2], density rho.
 
-    The first `alive[None]` entries hold particles; only an inflow leaves room for more. `born` ids have been given so far, and an
-    outlet's are not given again. `updated` is the tick of the last force evaluation, `level` the step in base steps (0 before the first evaluation), `identity` the stable particle id. Fields
-    are re-sorted now and then so that neighbours in space lie close in memory.
+    The first `alive[None]` entries hold particles; only an inflow leaves room for more. `born` ids have been given so far,
+    and an outlet's are not given again. `updated` is the tick of the last force evaluation, `level` the step in base steps (0
+    before the first evaluation), `identity` the stable particle id. Fields are re-sorted now and then so that neighbours in
+    space lie close in memory.
 
     Some fields exist only where something needs them (`needs`, a set of these names):
         rho_rate: d rho/dt [kg/(m^3 s)], where a density is carried through a step or integrated.

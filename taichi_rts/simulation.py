@@ -361,8 +361,8 @@ class Simulation:
 
         `overhead_fraction` is the share of a step in which all are due that everybody pays (grid, regions, prediction),
         measured on a sample of the steps. `stopped_by_domain` and `stopped_by_obstacles` count centres that a face of the
-        domain or an obstacle had to stop, `removed_by_outlets` particles that each outlet has taken out, `runaways` speeds and accelerations that had to be limited because the run has blown
-        up.
+        domain or an obstacle had to stop, `removed_by_outlets` particles that each outlet has taken out, `runaways` speeds
+        and accelerations that had to be limited because the run has blown up.
         """
         return {
             **self._tally.statistics(),

@@ -246,7 +246,7 @@ class _Watcher:
 def lost_particles(sim: Simulation, x: np.ndarray, expected: int) -> str:
     """Say how many particles are missing, outside the domain, or behind a wall that moved; empty if none.
 
-    `x` are positions [m], (N, dim). Faces of periodic axes lose nobody. More particles than `expected` come from inflows, and those
+    `x` are positions [m], (N, dim). Faces of periodic axes lose nobody. More particles than `expected` come from inflows; those
     that outlets have taken out are not missed.
     """
     expected -= sim.removed_count
