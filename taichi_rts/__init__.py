@@ -15,6 +15,7 @@ from taichi_rts.errors import (
     TimeError,
 )
 from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
+from taichi_rts.handover import change_stepper
 from taichi_rts.obstacles import (
     BoxObstacle,
     ConstantMotion,
@@ -81,6 +82,7 @@ __all__ = [
     "TimeError",
     "Uniform",
     "View",
+    "change_stepper",
     "init",
     "load_checkpoint",
     "load_scene",

@@ -104,6 +104,7 @@ class Simulation:
         self.particles = Particles(
             start.positions, start.velocities, start.densities, scene.rest_density, backend, needs, capacity
         )
+        self.start_viscosities = start.viscosities
         if self.particles.has_viscosity:
             unborn = capacity - len(start.positions)
             self.particles.viscosity.from_numpy(np.pad(start.viscosities, (0, unborn)).astype(backend.numpy_dtype))
@@ -160,9 +161,11 @@ class Simulation:
         self.setup_seconds = clock.perf_counter() - began
 
     def _start(self) -> None:
-        self.step()  # lines 1-2: validity 0, so everybody is due at tick 0, where the first forces are evaluated
+        self.step()  # lines 1-2: validity 0, so everybody is due now, where the first forces are evaluated
         self.schedule.take_counts()
-        self.schedule.begin(self.timeline, 0)  # as the line above: so that `wall_seconds` holds no compilation
+        self.schedule.begin(
+            self.timeline, self.timeline.now
+        )  # as the line above: so that `wall_seconds` holds no compilation
         ti.sync()
 
     def step(self) -> None:
