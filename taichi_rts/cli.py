@@ -144,7 +144,8 @@ class Run:
         if self.gui:
             from taichi_rts.rendering.live import watch  # only here, because it needs Vulkan and a display
 
-            watch(scene, stepper, self.picture(), lambda: rts.init(self.arch, self.precision or "f32"))
+            start = lambda: rts.init(self.arch, self.precision or "f32")  # noqa: E731
+            watch(scene, stepper, self.picture(), start, self.output_dir)
             return
         self.record(scene, panels)
 
