@@ -13,6 +13,7 @@ import taichi as ti
 from taichi_rts.errors import RenderError
 from taichi_rts.rendering.camera import Camera, box_corners, box_edges
 from taichi_rts.rendering.splatter import checked_arrays
+from taichi_rts.rendering.x_keys import XKeys
 
 WAY_OUT = "use --renderer splatter, or install Vulkan: apt-get install libvulkan1 mesa-vulkan-drivers"
 NO_DISPLAY = (
@@ -140,6 +141,7 @@ class LiveWindow:
         self._had_layout = self._layout.exists()
         self._window = _open(title, width, height, visible=True)
         self._overlay = _Overlay()
+        self._signs = XKeys(title)
         self.camera: Camera | None = None
         self._cursor: tuple[float, float] | None = None
         self._dragging = False
@@ -150,8 +152,8 @@ class LiveWindow:
         return self._window.running
 
     def pressed(self) -> list[str]:
-        """Return the keys pressed since the last call, by GGUI's names."""
-        return [event.key for event in self._window.get_events(ti.ui.PRESS)]
+        """Return the keys pressed since the last call, by GGUI's names; digits and signs by themselves (`XKeys`)."""
+        return [event.key for event in self._window.get_events(ti.ui.PRESS)] + self._signs.pressed()
 
     def draw(self, positions, colours, radius: float, camera: Camera, outline=None, panel=None, triangles=None) -> None:
         """Show one frame, and follow the user's mouse.
@@ -183,11 +185,12 @@ class LiveWindow:
                 camera = camera.panned(-dx * self.width / self.height, -dy)
             else:
                 camera = camera.zoomed(2.0 ** (-3.0 * dy))
-        closer = window.is_pressed("=", ti.ui.UP) - window.is_pressed("-", ti.ui.DOWN)
+        closer = window.is_pressed(ti.ui.UP) - window.is_pressed(ti.ui.DOWN)
         return camera.zoomed(0.97**closer) if closer else camera
 
     def close(self) -> None:
         """Close the window."""
+        self._signs.close()
         self._window.destroy()
         if not self._had_layout:
             self._layout.unlink(missing_ok=True)

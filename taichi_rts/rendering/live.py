@@ -27,16 +27,22 @@ SLIDER = 23.0
 PLOT_WIDTH, PLOT_HEIGHT, PLOT_EDGE = 260.0, 80.0, 12.0  # of the plot of level shares [pixels]
 BACKGROUND = (0.85, 0.86, 0.88)
 KEY_LINES = (
-    "Space pause . one base step",
-    "r reset      s l save, load",
-    "1 uniform    2 regional",
-    "3 asynchronous",
-    "c colours    p palette",
-    "x clip plane [ ] move it",
-    "v record     Return apply",
-    "= - zoom     Esc quit",
-    "drag: left orbit, right pan,",
-    "      middle zoom",
+    "Space   pause, go on",
+    ". or n  one base step",
+    "r       back to the start",
+    "1 or u  uniform steps",
+    "2 or g  regional steps",
+    "3 or a  asynchronous steps",
+    "Return  apply the sliders",
+    "c       next colours",
+    "p       other palette",
+    "x       clip plane, [ ] move it",
+    "s l     save, load the state",
+    "v       record, stop",
+    "h or ?  these keys",
+    "Esc     quit",
+    "drag left orbit, right pan,",
+    "middle or arrows zoom",
 )
 
 

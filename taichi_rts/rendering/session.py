@@ -299,6 +299,7 @@ class LiveSession:
     KEYS: ClassVar[dict[str, Callable[[LiveSession], object]]] = {
         " ": pause,
         ".": single_step,
+        "n": single_step,
         "r": reset,
         "c": next_colour,
         "p": next_palette,
@@ -308,9 +309,11 @@ class LiveSession:
         "s": save,
         "l": load,
         "v": record,
-        "1": lambda self: self.choose_stepper("uniform"),
-        "2": lambda self: self.choose_stepper("regional"),
-        "3": lambda self: self.choose_stepper("asynchronous"),
+        **{
+            key: lambda self, name=name: self.choose_stepper(name)
+            for name, keys in {"uniform": "1u", "regional": "2g", "asynchronous": "3a"}.items()
+            for key in keys
+        },
         "Return": apply,
         "h": help,
         "/": help,
