@@ -1,7 +1,7 @@
 """Spatially varying time stepping for weakly compressible SPH, on Taichi. Importing starts nothing; call `init`."""
 
 from taichi_rts.backend import init
-from taichi_rts.conditions import GravityChange, Inflow, MovingWall
+from taichi_rts.conditions import GravityChange, Inflow, MovingWall, Outlet
 from taichi_rts.diagnostics import Energy
 from taichi_rts.errors import (
     BackendError,
@@ -15,6 +15,7 @@ from taichi_rts.errors import (
     TimeError,
 )
 from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
+from taichi_rts.handover import change_stepper
 from taichi_rts.obstacles import (
     BoxObstacle,
     ConstantMotion,
@@ -59,6 +60,7 @@ __all__ = [
     "LinearField",
     "MeshObstacle",
     "MovingWall",
+    "Outlet",
     "OutputError",
     "ParticleFrame",
     "Particles",
@@ -80,6 +82,7 @@ __all__ = [
     "TimeError",
     "Uniform",
     "View",
+    "change_stepper",
     "init",
     "load_checkpoint",
     "load_scene",

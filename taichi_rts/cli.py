@@ -131,7 +131,7 @@ class Run:
         """Run it."""
         if self.gui and (self.panels or self.debug or self.resume or self.checkpoint_every):
             raise OutputError(
-                "--gui shows one run and checks and keeps nothing; leave out --panels, --debug, --resume and "
+                "--gui shows one run from its start and checks nothing; leave out --panels, --debug, --resume and "
                 "--checkpoint-every, or --gui"
             )
         if self.resume is not None:
@@ -141,11 +141,14 @@ class Run:
         stepper = self.make_stepper()
         panels = self.make_panels(scene.name, stepper)
         if self.gui and (self.video or self.gif or self.export or not self.frames):
-            raise OutputError("--gui saves nothing; leave out --video, --gif, --export and --no-frames, or --gui")
+            raise OutputError(
+                "--gui saves only what its keys ask for; leave out --video, --gif, --export and --no-frames, or --gui"
+            )
         if self.gui:
             from taichi_rts.rendering.live import watch  # only here, because it needs Vulkan and a display
 
-            watch(scene, stepper, self.picture(), lambda: rts.init(self.arch, self.precision or "f32"))
+            start = lambda: rts.init(self.arch, self.precision or "f32")  # noqa: E731
+            watch(scene, stepper, self.picture(), start, self.output_dir)
             return
         self.record(scene, panels)
 

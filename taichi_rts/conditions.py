@@ -1,4 +1,4 @@
-"""What changes during a run as the scene prescribes it: gravity, walls that move, fluid that flows in."""
+"""What changes during a run as the scene prescribes it: gravity, walls that move, fluid that flows in and out."""
 
 from __future__ import annotations
 
@@ -138,3 +138,23 @@ class Inflow:
     def face(self) -> str:
         """The face of the domain that it has to lie on, to flow inwards."""
         return AXES[self.axis] + ("-" if self.velocity[self.axis] > 0.0 else "+")
+
+
+@validated(SceneError)
+@dataclass(frozen=True, config=FROZEN)
+class Outlet:
+    """A sink: a box from `lower` to `upper` [m], (dim,), in which fluid is taken out of the run.
+
+    It leaves freely: what is still outside sees no fluid in there, so the pressure at the box's faces is 0.
+    """
+
+    lower: Vector
+    upper: Vector
+
+    @model_validator(mode="after")
+    def _check(self) -> Outlet:
+        if len(self.lower) != len(self.upper):
+            raise ValueError("lower and upper differ in dimension; give all 2 or all 3 components")
+        if not all(a < b for a, b in zip(self.lower, self.upper, strict=True)):
+            raise ValueError(f"box from {self.lower} to {self.upper} has no extent; let every component ascend")
+        return self

@@ -42,14 +42,18 @@ def measure_energy(
 ) -> Energy:
     """Sum kinetic, potential (in the gravity of `time` [s]) and internal energy [J] of particles in a fixed order, in f64."""
     x, v, rho = (np.asarray(array, dtype=np.float64) for array in (positions, velocities, densities))
-    potential = -(x @ np.asarray(scene.acceleration_at(time))) - scene.floor_potential
-    if scene.body_force is not None:
-        potential += scene.body_force.potential(x)
+    potential = potential_of(scene, x, time)
     return Energy(
         kinetic=float(0.5 * medium.mass * (v * v).sum()),
         potential=float(medium.mass * potential.sum()),
         internal=float(medium.mass * medium.equation_of_state.specific_energy(rho).sum()),
     )
+
+
+def potential_of(scene: Scene, x: np.ndarray, time: float) -> np.ndarray:
+    """Potential energy [J/kg], (N,), at positions `x` [m], (N, dim), in the gravity of `time` [s] and the body force."""
+    potential = -(x @ np.asarray(scene.acceleration_at(time))) - scene.floor_potential
+    return potential if scene.body_force is None else potential + scene.body_force.potential(x)
 
 
 @dataclass

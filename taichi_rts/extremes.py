@@ -28,9 +28,9 @@ class Extremes:
             _x, v, rho, _level = sim.state()
             mach = np.linalg.norm(v, axis=1) / sim.sound_speeds()
             ratio = rho / sim.medium.rest_density
-            self.mach[key] = max(self.mach[key], float(mach.max()))
-            self.density[key] = max(self.density[key], float(ratio.max()))
-            self.dense[key] = max(self.dense[key], float((ratio > DENSE).mean()))
+            self.mach[key] = max(self.mach[key], float(mach.max(initial=0.0)))
+            self.density[key] = max(self.density[key], float(ratio.max(initial=0.0)))
+            self.dense[key] = max(self.dense[key], float((ratio > DENSE).sum()) / max(1, len(ratio)))
 
     def data(self) -> list[list[float]]:
         """Return what has been seen so far, run by run, for a checkpoint."""

@@ -51,6 +51,11 @@ class Inflows:
         self.capacity = sum(patch.layers * len(patch.positions) for patch in self.patches)
         """How many particles enter until the scene's end."""
 
+    @property
+    def entered(self) -> int:
+        """How many particles have entered so far."""
+        return sum(done * len(patch.positions) for done, patch in zip(self.done, self.patches, strict=True))
+
     def waiting(self, time: float) -> bool:
         """Whether a layer has crossed its patch by `time` [s] and is not among the particles yet."""
         return any(patch.entered(time) > done for patch, done in zip(self.patches, self.done, strict=True))

@@ -36,9 +36,9 @@ def nearest_image(gap: np.ndarray, lengths: np.ndarray) -> np.ndarray:
 
 
 def front(x: np.ndarray) -> float:
-    """Front of the fluid [m]: its fifth-largest x; `x` [m] is (N, dim)."""
-    along = x[:, 0]
-    return float(np.partition(along, -FRONT_RANK)[-FRONT_RANK]) if len(along) >= FRONT_RANK else float(along.max())
+    """Front of the fluid [m]: its fifth-largest x, 0 without any; `x` [m] is (N, dim)."""
+    along, rank = x[:, 0], min(FRONT_RANK, len(x))
+    return float(np.partition(along, -rank)[-rank]) if rank else 0.0
 
 
 def interpolate(x: np.ndarray, values: np.ndarray, points: np.ndarray, kernel: Any, lengths: np.ndarray) -> np.ndarray:

@@ -23,9 +23,10 @@ def vector_field(dim: int, dtype: Any, count: int) -> ti.MatrixField:
 class Particles:
     """Struct-of-arrays fields, (capacity,) each; positions x [m], velocities v [m/s], accelerations a [m/s^2], density rho.
 
-    The first `alive[None]` entries hold particles; only an inflow leaves room for more. `updated` is the tick of the last
-    force evaluation, `level` the step in base steps (0 before the first evaluation), `identity` the stable particle id. Fields
-    are re-sorted now and then so that neighbours in space lie close in memory.
+    The first `alive[None]` entries hold particles; only an inflow leaves room for more. `born` ids have been given so far,
+    and an outlet's are not given again. `updated` is the tick of the last force evaluation, `level` the step in base steps (0
+    before the first evaluation), `identity` the stable particle id. Fields are re-sorted now and then so that neighbours in
+    space lie close in memory.
 
     Some fields exist only where something needs them (`needs`, a set of these names):
         rho_rate: d rho/dt [kg/(m^3 s)], where a density is carried through a step or integrated.
@@ -56,7 +57,7 @@ class Particles:
         count, self.dim = positions.shape
         self.capacity = count if capacity is None else capacity
         self.alive = ti.field(ti.i32, ())
-        self.alive[None] = self.count = count
+        self.alive[None] = self.count = self.born = count
         self.has_rho_rate = "rho_rate" in needs
         self.has_diffusion = "diffusion" in needs
         self.has_past = "past" in needs
@@ -111,15 +112,26 @@ class Particles:
 
     def to_numpy(self, field: ti.Field) -> np.ndarray:
         """Values of one of the fields in order of particle id, (N,) or (N, dim)."""
-        values = field.to_numpy()[: self.count]
-        ordered = np.empty_like(values)
-        ordered[self.identity.to_numpy()[: self.count]] = values
-        return ordered
+        values, identity = field.to_numpy()[: self.count], self.identity.to_numpy()[: self.count]
+        ordered = np.empty((self.born, *values.shape[1:]), values.dtype)
+        ordered[identity] = values
+        return ordered if self.count == self.born else ordered[np.sort(identity)]
+
+    def ids(self) -> np.ndarray:
+        """Ids of the particles that are there, (N,), ascending."""
+        return np.sort(self.identity.to_numpy()[: self.count])
 
     def grow(self, count: int) -> None:
         """Make room for `count` more at the end, whose ids follow."""
         self.count += count
+        self.born += count
         self.alive[None] = self.count
+
+    def shrink(self, order: ti.Field, count: int) -> None:
+        """Bring all entries, unused ones too, into `order`, (capacity,), and let only the first `count` of them be particles."""
+        self.alive[None] = self.capacity
+        self.reorder(order)
+        self.alive[None] = self.count = count
 
     def reorder(self, order: ti.Field) -> None:
         """Move entry `order[k]` of every field to place k, then make `order` the identity."""

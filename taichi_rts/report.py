@@ -110,6 +110,8 @@ def print_table(
         facts.add_row("sound speed", f"{c.min():.3g} to {c.max():.3g} m/s at the end, mean {c.mean():.3g}")
         if sim.particles.has_budget:
             facts.add_row("put in by its changes", f"{sim.sound_work():+.3g} J, in the drift")
+    for number, removed in enumerate(statistics.get("removed_by_outlets", [])):
+        facts.add_row(f"outlet {number}", f"{removed:,} particles, {removed * sim.medium.mass:.4g} kg")
     facts.add_row("stopped by the box", f"{statistics['stopped_by_domain']:,} centres")
     if sim.scene.obstacles:
         facts.add_row("held by obstacles", f"{statistics['stopped_by_obstacles']:,} times a centre")

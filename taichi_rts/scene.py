@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
 from taichi_rts.bodies import bodies
-from taichi_rts.conditions import AXES, Axis, GravityChange, Inflow, MovingWall
+from taichi_rts.conditions import AXES, Axis, GravityChange, Inflow, MovingWall, Outlet
 from taichi_rts.errors import SceneError
 from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
 from taichi_rts.obstacles import SHAPES, ConstantMotion, Keyframes, Obstacle
@@ -79,6 +79,7 @@ class Scene:
         periodic: axes ("x", "y", "z") along which the domain repeats itself; they have no walls.
         moving_walls: faces of the domain that move.
         inflows: patches of the domain's faces through which fluid enters.
+        outlets: boxes in which fluid is taken out.
         probes: points where a run's time series has the pressure.
         gauges: lines along gravity on which it has the water's height.
         obstacles: rigid bodies, at rest or moving as prescribed (`taichi_rts.obstacles`); fluid inside them is left out.
@@ -107,6 +108,7 @@ class Scene:
     periodic: tuple[Axis, ...] = ()
     moving_walls: tuple[MovingWall, ...] = ()
     inflows: tuple[Inflow, ...] = ()
+    outlets: tuple[Outlet, ...] = ()
     probes: tuple[Probe, ...] = ()
     gauges: tuple[Gauge, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
@@ -294,6 +296,7 @@ _PARTS = (
     GravityChange,
     MovingWall,
     Inflow,
+    Outlet,
     Probe,
     Gauge,
     View,

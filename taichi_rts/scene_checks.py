@@ -136,6 +136,7 @@ def _condition_faults(scene: Scene) -> list[str]:
                 d
             ] + _slack(scene):
                 faults.append(f"inflows.{k}: the patch leaves the domain; shrink it")
+    faults += _outlet_faults(scene)
     times = [change.time for change in scene.gravity_changes]
     if times != sorted(set(times)):
         faults.append(f"gravity_changes: times {times} must ascend")
@@ -144,6 +145,29 @@ def _condition_faults(scene: Scene) -> list[str]:
             faults.append(
                 f"gravity_changes.{k}: gravity has {len(change.gravity)} components; the domain has {scene.dim}"
             )
+    return faults
+
+
+def _outlet_faults(scene: Scene) -> list[str]:
+    """Find outlets that lie outside the domain, are so thin that fluid may cross them, or take what an inflow lets in."""
+    faults = []
+    for k, outlet in enumerate(scene.outlets):
+        if len(outlet.lower) != scene.dim:
+            faults.append(f"outlets.{k}: has {len(outlet.lower)} components; the domain has {scene.dim}")
+            continue
+        for d in range(scene.dim):
+            low, high = outlet.lower[d], outlet.upper[d]
+            if low < scene.domain.lower[d] - _slack(scene) or high > scene.domain.upper[d] + _slack(scene):
+                faults.append(f"outlets.{k}: the box leaves the domain along {AXES[d]!r}; shrink it")
+            if high - low < scene.support * (1 - 1e-6):
+                faults.append(
+                    f"outlets.{k}: the box is {high - low:g} thick along {AXES[d]!r}, and fluid may cross it unseen; "
+                    f"make it at least a support radius, {scene.support:g}"
+                )
+        for n, inflow in enumerate(scene.inflows):
+            near = zip(inflow.lower, outlet.upper, outlet.lower, inflow.upper, strict=False)
+            if len(inflow.lower) == scene.dim and all(a <= b and c <= d for a, b, c, d in near):
+                faults.append(f"outlets.{k}: takes out what inflows.{n} lets in; move one of them")
     return faults
 
 

@@ -20,6 +20,7 @@ from taichi_rts.frames import frame_times
 from taichi_rts.grid import BlockGrid, Geometry
 from taichi_rts.inflow import Inflows
 from taichi_rts.motion import Motion
+from taichi_rts.outlet import Outlets
 from taichi_rts.particles import Neighbourhood, Particles
 from taichi_rts.physics.continuity import ContinuityDensity, DensityDiffusion, MirroredPressure
 from taichi_rts.physics.density import SummationDensity
@@ -105,6 +106,7 @@ class Simulation:
         self.particles = Particles(
             start.positions, start.velocities, start.densities, scene.rest_density, backend, needs, capacity
         )
+        self.start_viscosities = start.viscosities
         if self.particles.has_viscosity:
             unborn = capacity - len(start.positions)
             self.particles.viscosity.from_numpy(np.pad(start.viscosities, (0, unborn)).astype(backend.numpy_dtype))
@@ -152,6 +154,7 @@ class Simulation:
             integrates_density=density.integrates,
             obstacles=make_keepers(scene, geometry),
         )
+        self.outlets = Outlets(scene, self.motion, start.mass) if scene.outlets else None
         self.schedule = self.stepper.schedule(scene, self.particles, self.grid, self.timeline)
         self.schedule.debug = debug
         self.schedule.sound = self.sound
@@ -169,9 +172,11 @@ class Simulation:
         self.setup_seconds = clock.perf_counter() - began
 
     def _start(self) -> None:
-        self.step()  # lines 1-2: validity 0, so everybody is due at tick 0, where the first forces are evaluated
+        self.step()  # lines 1-2: validity 0, so everybody is due now, where the first forces are evaluated
         self.schedule.take_counts()
-        self.schedule.begin(self.timeline, 0)  # as the line above: so that `wall_seconds` holds no compilation
+        self.schedule.begin(
+            self.timeline, self.timeline.now
+        )  # as the line above: so that `wall_seconds` holds no compilation
         ti.sync()
 
     def step(self) -> None:
@@ -196,6 +201,9 @@ class Simulation:
         if self.inflows and self.inflows.waiting(now * tick):
             self._collect_counts()
             self.inflows.enter(self.particles, now, tick)
+        if self.outlets and (leaving := self.outlets.find(now, tick)):
+            self._collect_counts()
+            self.outlets.take_out(leaving, now, tick)
         if self._sorts % REORDER_EVERY == 0:
             self.particles.reorder(self.grid.order)
         self._sorts += 1
@@ -294,6 +302,15 @@ class Simulation:
         """Number of fluid particles N."""
         return self.particles.count
 
+    def ids(self) -> np.ndarray:
+        """Stable ids, (N,), of the particles that all readers speak of, ascending; an outlet takes some out for good."""
+        return self.particles.ids()
+
+    @property
+    def removed_count(self) -> int:
+        """Number of particles that outlets have taken out so far."""
+        return sum(self.outlets.removed) if self.outlets else 0
+
     @property
     def base_step(self) -> float:
         """The base step dt_b [s]; levels step at whole multiples of it."""
@@ -301,12 +318,15 @@ class Simulation:
 
     def state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Positions [m] and velocities [m/s], (N, dim), densities [kg/m^3] and levels, (N,), at `time`, by particle id."""
-        dtype, shape = self.backend.numpy_dtype, (self.count, self.scene.dim)
-        x, v = np.empty(shape, dtype), np.empty(shape, dtype)
-        rho, level = np.empty(self.count, dtype), np.empty(self.count, np.int32)
+        dtype, born = self.backend.numpy_dtype, self.particles.born
+        x, v = np.empty((born, self.scene.dim), dtype), np.empty((born, self.scene.dim), dtype)
+        rho, level = np.empty(born, dtype), np.empty(born, np.int32)
         now, tick = self.timeline.now, self.timeline.tick
         self.motion.export(now, tick, self._time - self.timeline.time, x, v, rho, level)
-        return x, v, rho, level
+        if self.count == born:
+            return x, v, rho, level
+        ids = self.ids()
+        return x[ids], v[ids], rho[ids], level[ids]
 
     def positions(self) -> np.ndarray:
         """Positions [m], (N, dim), predicted to `time`, in order of particle id."""
@@ -346,7 +366,7 @@ class Simulation:
         """How far [s] the end of each particle's step lies ahead of the earliest end, (N,). In order of particle id."""
         p = self.particles
         ends = p.to_numpy(p.updated) + p.to_numpy(p.level) * self.schedule.base_ticks
-        return (ends - ends.min()) * self.timeline.tick
+        return (ends - ends.min(initial=np.iinfo(ends.dtype).max)) * self.timeline.tick
 
     @property
     def statistics(self) -> dict[str, Any]:
@@ -354,14 +374,15 @@ class Simulation:
 
         `overhead_fraction` is the share of a step in which all are due that everybody pays (grid, regions, prediction),
         measured on a sample of the steps. `stopped_by_domain` and `stopped_by_obstacles` count centres that a face of the
-        domain or an obstacle had to stop, `runaways` speeds and accelerations that had to be limited because the run has blown
-        up.
+        domain or an obstacle had to stop, `removed_by_outlets` particles that each outlet has taken out, `runaways` speeds
+        and accelerations that had to be limited because the run has blown up.
         """
         return {
             **self._tally.statistics(),
             "overhead_fraction": self.overhead.fraction,
             "stopped_by_domain": int(self.motion.stopped[None]),
             "stopped_by_obstacles": int(self.motion.stopped_by_obstacles[None]),
+            **({"removed_by_outlets": list(self.outlets.removed)} if self.outlets else {}),
             "runaways": int(self.motion.runaways[None]),
             **self.schedule.statistics(),
         }
@@ -379,7 +400,8 @@ class Simulation:
     def work(self) -> float:
         """Energy [J] that changes of gravity, moving walls, moving obstacles and inflows have put in until `time`.
 
-        What flows in brings its kinetic and potential energy. All but gravity need a debug run, else raises `Error`.
+        What flows in brings its kinetic and potential energy, what flows out takes its own along. Moving things and inflows
+        need a debug run, else raises `Error`.
         """
         total = self._gravity_work
         p = self.particles
@@ -389,6 +411,8 @@ class Simulation:
             elapsed = self._time - p.to_numpy(p.updated) * self.timeline.tick
             done = p.to_numpy(p.work).astype(float) + elapsed * p.to_numpy(p.power)
             total += self.medium.mass * float(done.sum()) + (self.inflows.energy if self.inflows else 0.0)
+        if self.outlets:
+            total += self.outlets.work - self.outlets.energy
         return total
 
     def sound_work(self) -> float:
@@ -421,18 +445,20 @@ class Simulation:
     def keeps_momentum_budget(self) -> bool:
         """Whether `momentum_drift` can say anything."""
         scene = self.scene
-        return self.particles.has_budget and not (scene.body_force or scene.gravity_changes or scene.inflows)
+        return self.particles.has_budget and not (
+            scene.body_force or scene.gravity_changes or scene.inflows or scene.outlets
+        )
 
     def momentum_drift(self) -> np.ndarray:
         """Momentum [kg m/s], (dim,), that no outer force accounts for: the change less gravity's and the walls' share.
 
         Zero to rounding with uniform steps, where partners push each other equally at the same time. Needs a debug run and a
-        scene without body force, changes of gravity and inflows, else raises `Error`.
+        scene without body force, changes of gravity, inflows and outlets, else raises `Error`.
         """
         if not self.keeps_momentum_budget:
             raise Error(
                 "the momentum budget needs Simulation(..., debug=True), "
-                "and a scene without body_force, gravity_changes and inflows"
+                "and a scene without body_force, gravity_changes, inflows and outlets"
             )
         p = self.particles
         elapsed = self._time - p.updated.to_numpy() * self.timeline.tick

@@ -96,6 +96,10 @@ def plan(scene: Scene, settings: Settings) -> tuple[list[tuple[Scene, dict[str, 
             f"samples {settings.samples}, repeats {settings.repeats}, parted {settings.parted:g}: at least 2, at least 1 and "
             "above 0 are needed; try 40, 3 and 0.01"
         )
+    if scene.outlets:
+        raise Error(
+            f"the scene has {len(scene.outlets)} outlets, and runs are compared particle by particle; leave them out"
+        )
     changes = sweeps.for_scene(sets, settings.steppers)
     scenes = list(zip(sweeps.scenes_of(scene, changes), changes, strict=True))
     return scenes, make_variants(scenes, settings.steppers, settings.courants, sets)

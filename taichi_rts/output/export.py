@@ -17,7 +17,7 @@ from taichi_rts.simulation import Simulation
 
 State = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 ATTRIBUTES: dict[str, Callable[[Simulation, State], np.ndarray]] = {
-    "id": lambda sim, state: np.arange(sim.count, dtype=np.int32),
+    "id": lambda sim, state: sim.ids(),
     "velocity": lambda sim, state: state[1],
     "density": lambda sim, state: state[2],
     "pressure": lambda sim, state: sim.medium.equation_of_state.pressure_numpy(state[2]),

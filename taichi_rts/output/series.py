@@ -24,7 +24,8 @@ class Series:
 
     Columns: time [s]; kinetic_energy, potential_energy, internal_energy [J]; front (fifth-largest x), centre_x ... [m], the
     centre of mass; max_speed [m/s]; level_n, the share of particles whose step is n base steps (where levels double: n up to
-    2n - 1); particle_updates so far; pressure_NAME [Pa] of each probe of the scene; height_NAME [m] of each gauge;
+    2n - 1); particle_updates so far; inflow and outlet_n [kg], the mass that has come in so far and that each outlet, counted
+    from 0, has taken out; pressure_NAME [Pa] of each probe of the scene; height_NAME [m] of each gauge;
     force_FACE [N], the pressure force on each wall of the domain along its outward normal (`measuring.FaceForces`). In two
     dimensions energies and forces are per metre of depth.
     """
@@ -56,6 +57,7 @@ class Series:
         x, v, rho, level = sim.state()
         p = sim.medium.equation_of_state.pressure_numpy(rho)
         lengths = measuring.periods(scene)
+        centre = x.sum(axis=0, dtype=np.float64) / max(1, len(x))  # outlets may have taken out all
         points = np.array([probe.position for probe in scene.probes]).reshape(-1, scene.dim)
         pressures = measuring.interpolate(x, p, points, sim.medium.kernel, lengths)
         heights = [measuring.water_height(scene, sim.medium, x, np.asarray(g.position)) for g in scene.gauges]
@@ -63,10 +65,11 @@ class Series:
             "time": sim.time,
             **{f"{name}_energy": value for name, value in sim.energy()._asdict().items()},
             "front": measuring.front(x),
-            **dict(zip((f"centre_{axis}" for axis in AXES), x.mean(axis=0, dtype=np.float64), strict=False)),
-            "max_speed": float(np.linalg.norm(v, axis=1).max()),
+            **dict(zip((f"centre_{axis}" for axis in AXES), centre, strict=False)),
+            "max_speed": float(np.linalg.norm(v, axis=1).max(initial=0.0)),
             **self._shares(level),
             "particle_updates": sim.statistics["particle_updates"],
+            **self._flows(),
             **{f"pressure_{name}": value for name, value in zip(probes.names(scene.probes), pressures, strict=True)},
             **{f"height_{name}": value for name, value in zip(probes.names(scene.gauges), heights, strict=True)},
             **{
@@ -75,9 +78,15 @@ class Series:
             },
         }
 
+    def _flows(self) -> dict[str, float]:
+        sim = self.sim
+        inflow = {"inflow": sim.medium.mass * sim.inflows.entered} if sim.inflows else {}
+        removed = sim.outlets.removed if sim.outlets else []
+        return inflow | {f"outlet_{number}": sim.medium.mass * n for number, n in enumerate(removed)}
+
     def _shares(self, level: np.ndarray) -> dict[str, float]:
         schedule = self.sim.schedule
-        shares = np.bincount(level, minlength=schedule.levels + 1)[1:] / len(level)
+        shares = np.bincount(level, minlength=schedule.levels + 1)[1:] / max(1, len(level))
         first = 2 ** np.arange(schedule.levels.bit_length()) if schedule.levels_double else np.arange(len(shares)) + 1
         sums = np.add.reduceat(shares, first - 1)
         return {f"level_{n}": float(share) for n, share in zip(first, sums, strict=True)}

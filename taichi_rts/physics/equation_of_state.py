@@ -42,6 +42,13 @@ class Tait:
         return self.pressure(rho)
 
     @ti.func
+    def energy_of(self, i, rho):
+        """Energy of compression [J/kg] of particle `i` at density `rho` [kg/m^3], as `specific_energy` gives it."""
+        ratio = ti.max(rho / self.rest_density, self.least_ratio)
+        compression = self.stiffness / self.rest_density * (ti.pow(ratio, 6.0) / 6.0 + 1.0 / ratio - 7.0 / 6.0)
+        return compression + self.background / self.rest_density * (1.0 - 1.0 / ratio)
+
+    @ti.func
     def adapt(self, i, block, rho, elapsed):
         """Take note that particle `i` in `block` now has density `rho` [kg/m^3], `elapsed` [s] after its last evaluation."""
 

@@ -57,8 +57,8 @@ class ForceMeter:
         particles, dim = self.motion.particles, self.scene.dim
         self.motion.predict_neighbourhood(self.everywhere, now, tick)
         self.observe(now, tick)
-        rates = np.zeros((len(self.sums), particles.count, dim), self.dtype)
-        places = np.zeros((particles.count, dim), self.dtype)
+        rates = np.zeros((len(self.sums), particles.born, dim), self.dtype)  # zeros of who has gone add nothing
+        places = np.zeros((particles.born, dim), self.dtype)
         self.collect(rates, places)
         push = -mass * rates.astype(np.float64)
         pivots = np.array([self.pivot(k, now * tick) for k in range(len(self.sums))])

@@ -58,8 +58,7 @@ def diagnose(sim: Simulation) -> Diagnosis | None:
     x, v, rho, levels = (np.asarray(values, dtype=np.float64) for values in sim.state())
     finite = np.isfinite(x).all(axis=1) & np.isfinite(v).all(axis=1) & np.isfinite(rho)
     c, r = sim.medium.sound_speed, sim.medium.support
-    a = np.empty_like(v)
-    a[sim.particles.identity.to_numpy()] = sim.particles.a.to_numpy()
+    a = sim.particles.to_numpy(sim.particles.a).astype(np.float64)
     speed, acceleration = np.linalg.norm(v, axis=1), np.linalg.norm(a, axis=1)
     shares = np.stack([speed / (RUNAWAY_SPEED * c), acceleration / (RUNAWAY_ACCELERATION * c * c / r)])
     shares[:, ~finite] = np.inf

@@ -254,8 +254,10 @@ class _Watcher:
 def lost_particles(sim: Simulation, x: np.ndarray, expected: int) -> str:
     """Say how many particles are missing, outside the domain, or behind a wall that moved; empty if none.
 
-    `x` are positions [m], (N, dim). Faces of periodic axes lose nobody. More particles than `expected` come from inflows.
+    `x` are positions [m], (N, dim). Faces of periodic axes lose nobody. More particles than `expected` come from inflows; those
+    that outlets have taken out are not missed.
     """
+    expected -= sim.removed_count
     if sim.count < expected:
         return f"{expected - sim.count} of {expected} particles gone"
     lower, upper = (np.array(corner, dtype=np.float64) for corner in (sim.scene.domain.lower, sim.scene.domain.upper))

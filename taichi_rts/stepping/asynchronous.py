@@ -189,6 +189,10 @@ class AsynchronousSchedule(Cells):
             self.blind -= 1
             return self.launch(False)
         youngest = int(self.youngest[None])
+        if (
+            youngest == self.EMPTY
+        ):  # outlets have taken out all; what an inflow still brings comes when the grid is sorted
+            youngest = self.cycle_end
         if youngest > target:
             self.steps = max(self.steps, target)
             return False
@@ -200,6 +204,17 @@ class AsynchronousSchedule(Cells):
         if self.reads_are_slow:
             self.blind = max(0, int(self.passes_in_cycle[None]) - 1)
         return self.launch(True)
+
+    def restart(self, now: int) -> None:
+        """Forget steps, and begin with a cycle of one evaluation."""
+        self.particles.level.fill(0)
+        self.target = self.steps = now
+        self.cycle_end = now + 1
+        self.blind = 0
+        self.needs_sorting = self.needs_sound = True
+        self.take_counts()
+        self.seen_widths.clear()
+        self.cycles, self.all_wakes, self.all_clamped = 1, 0, 0
 
     def launch(self, needs_sorting: bool) -> bool:
         """Note that a pass begins.

@@ -99,6 +99,9 @@ class Schedule:
         self.steps += 1
         return True
 
+    def restart(self, now: int) -> None:
+        """Forget steps and levels: at tick `now` everybody is due, as at the start."""
+
     def next_ticks(self) -> int:
         """Length of the next step in ticks; it depends on the state only."""
         return 1

@@ -230,6 +230,16 @@ class RegionalSchedule(Schedule):
             self.reach = stepper.in_scene(self.scene).resolved("courant") * self.support
         return True
 
+    def restart(self, now: int) -> None:
+        """Forget steps and levels."""
+        self.now = self.steps = now
+        self.particles.level.fill(0)
+        self.block_level.fill(BlockLimiter.EMPTY)
+        if self.aligned:
+            self.last_level.fill(BlockLimiter.EMPTY)
+            self.held.fill(0)
+        self.take_counts()
+
     def begin(self, timeline: Timeline, target: int) -> bool:
         """Set the clock to the next step at which somebody may be due."""
         begun = super().begin(timeline, target)

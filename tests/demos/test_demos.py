@@ -25,6 +25,7 @@ COARSE = {
     "poiseuille": 0.05,
     "standing_wave": 0.05,
     "koshizuka_oka": 0.0146,
+    "torricelli": 0.05,
 }
 END = {"martin_moyce": 0.02, "elliptical_drop": 0.0082, "oscillating_drop": 0.5}
 SCENE = {"asynchronous_dam_break": "dam_break"}  # demos that show a scene of another name

@@ -374,7 +374,7 @@ def test_built_in_scenes_load_in_both_dimensions():
     required = "dam_break double_dam_break dam_break_drop serna_ablation martin_moyce still_pool free_fall"
     names = rts.scene_names()
     flat = {"elliptical_drop", "oscillating_drop", "hydrostatic_column", "taylor_green", "poiseuille", "standing_wave"}
-    flat |= {"koshizuka_oka"}
+    flat |= {"koshizuka_oka", "torricelli"}
     assert set(required.split()) | flat | {"dam_break_2d", "double_dam_break_2d"} <= set(names)
     for name in names:
         loaded = rts.load_scene(name)

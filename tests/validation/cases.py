@@ -92,6 +92,22 @@ def pressure_error(scene, looks):
     return {"pressure": float(np.mean([error(look) for look in looks]))}
 
 
+def jet_errors(scene, looks):
+    """Relative error, with its sign, of the jet's speed against sqrt(2 g h), mean over its particles and the looks.
+
+    h is their depth under the tank's surface, which lies half a spacing over its 20 highest particles.
+    """
+    floor, sink = scene.obstacles[0].lower[1], scene.outlets[0].upper[1]
+
+    def error(look):
+        surface = np.sort(look.x[:, 1])[-20:].mean() + 0.5 * scene.spacing
+        jet = (look.x[:, 1] > sink + 0.05) & (look.x[:, 1] < floor)
+        fall = np.sqrt(2.0 * measured.G * (surface - look.x[jet, 1]))
+        return float((np.linalg.norm(look.v[jet], axis=1) / fall).mean()) - 1.0
+
+    return {"jet": float(np.mean([error(look) for look in looks]))}
+
+
 def vortex_errors(scene, looks):
     """Largest error of the rms speed over its start's, and relative L2 error of the velocities at the last look."""
     k = 2.0 * math.pi / scene.fluids[0].velocity.wavelength
@@ -218,6 +234,7 @@ CASES = {
         False,
     ),
     "taylor_green": Case("taylor_green", (0.05, 0.025), parts(4), vortex_errors),
+    "torricelli": Case("torricelli", (0.03, 0.02), parts(4, 0.25), jet_errors),
     "poiseuille": Case("poiseuille", (0.1, 0.05), start_up, poiseuille_errors),
     "poiseuille_jax": Case(
         "poiseuille",

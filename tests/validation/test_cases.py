@@ -67,6 +67,11 @@ def test_standing_wave(errors, stepper):
     assert -0.12 < found["crest"] < 0.02  # measured -0.064, -0.082, -0.107; speed times 1.1: 0.029
 
 
+@pytest.mark.parametrize("stepper", ["uniform"])
+def test_torricelli(errors, stepper):
+    assert -0.1 < errors("torricelli", stepper)["jet"] < -0.05  # measured -0.078; gravity times 1.1 moves it by 0.05
+
+
 @pytest.mark.parametrize("stepper", ["uniform", "paper"])
 def test_koshizuka_oka(errors, stepper):
     found = errors("koshizuka_oka", stepper)

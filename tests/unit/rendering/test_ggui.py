@@ -44,5 +44,14 @@ def test_offscreen_picture_has_the_particles_where_the_camera_says(renderer, dim
 def test_window_without_a_display_names_the_way_out(monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    with pytest.raises(RenderError, match=r"DISPLAY.*--renderer splatter.*apt-get install"):
+    with pytest.raises(RenderError, match=r"neither DISPLAY nor.*xvfb-run.*apt-get install xvfb.*--renderer splatter"):
+        LiveWindow(64, 48)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems always have a display")
+@pytest.mark.parametrize("display", [":54321", "nonsense", "127.0.0.1:54321"])
+def test_a_display_that_does_not_answer_is_an_error_and_not_the_end(monkeypatch, display):
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setenv("DISPLAY", display)
+    with pytest.raises(RenderError, match=f"DISPLAY '{display}' does not answer: run from a desktop session"):
         LiveWindow(64, 48)
