@@ -9,7 +9,8 @@ from typing import Annotated, Any, TypeVar
 
 import pydantic
 from annotated_types import Len
-from pydantic import ConfigDict, Field
+from PIL import ImageColor
+from pydantic import AfterValidator, ConfigDict, Field
 
 from taichi_rts.errors import Error
 
@@ -17,7 +18,17 @@ FROZEN = ConfigDict(extra="forbid", allow_inf_nan=False, arbitrary_types_allowed
 Vector = Annotated[tuple[float, ...], Len(2, 3)]
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
+Colour = Annotated[str, AfterValidator(lambda name: _known_colour(name))]
+"""A colour by its name in HTML or as "#RRGGBB"."""
 T = TypeVar("T", bound=type)
+
+
+def _known_colour(name: str) -> str:
+    try:
+        ImageColor.getrgb(name)
+    except ValueError:
+        raise ValueError(f"{name!r} is no colour; give a name such as 'orange', or '#RRGGBB'") from None
+    return name
 
 
 def describe(error: pydantic.ValidationError, subject: str, names: Iterable[str] = ()) -> str:
