@@ -149,6 +149,16 @@ class Scene:
         return (*(self.kinematic_viscosity if nu is None else nu for nu in own), *inflow)
 
     @property
+    def fluid_names(self) -> tuple[str, ...]:
+        """What legends call each fluid, (len(fluids),), and what flows in, if anything does."""
+        return (*(f"fluid {k}" for k in range(1, len(self.fluids) + 1)), *("inflow",) * bool(self.inflows))
+
+    @property
+    def fluid_colours(self) -> tuple[str | None, ...]:
+        """Colour of each of `fluid_names`, None for the palette's."""
+        return (*(fluid.colour for fluid in self.fluids), *(None,) * bool(self.inflows))
+
+    @property
     def regional_sound(self) -> RegionalSound | None:
         """What governs the regional sound speed, if there is one."""
         if self.sound_speed == "regional":
