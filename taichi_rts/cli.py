@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import sys
 import warnings
 from pathlib import Path
@@ -266,8 +267,14 @@ def flags(keys: list[str]) -> str:
 class Scenes:
     """List the built-in scenes."""
 
+    schema: bool = False
+    """Print the JSON Schema of scene files instead, for editors (docs/scene_files.md)."""
+
     def __call__(self) -> None:
         """List them."""
+        if self.schema:
+            print(json.dumps(rts.scene_schema(), indent=2))
+            return
         report.print_scenes([rts.load_scene(name) for name in rts.scene_names()])
 
 

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Discriminator, Tag, model_validator
 from pydantic.dataclasses import dataclass
 
 from taichi_rts.errors import SceneError
-from taichi_rts.rotations import Turn, rotation_matrix
+from taichi_rts.rotations import Turn, number_or_list, rotation_matrix
 from taichi_rts.shapes import Box
 from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, validated
 
@@ -24,7 +24,7 @@ def _as_scale(value: Any) -> Any:
     return (value,) * 3
 
 
-Scale = Annotated[tuple[Positive, ...], Len(3, 3), BeforeValidator(_as_scale)]
+Scale = Annotated[tuple[Positive, ...], Len(3, 3), BeforeValidator(_as_scale), number_or_list(3)]
 """One number, or one for each axis."""
 
 

@@ -6,14 +6,20 @@ from typing import Annotated, Any
 
 import numpy as np
 from annotated_types import Len
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, WithJsonSchema
 
 
 def _as_tuple(value: Any) -> Any:
     return (value,) if isinstance(value, (int, float)) and not isinstance(value, bool) else value
 
 
-Turn = Annotated[tuple[float, ...], Len(1, 3), BeforeValidator(_as_tuple)]
+def number_or_list(least: int) -> WithJsonSchema:
+    """Tell a JSON Schema that one number will do, or `least` to 3 of them."""
+    numbers = {"type": "array", "items": {"type": "number"}, "minItems": least, "maxItems": 3}
+    return WithJsonSchema({"anyOf": [{"type": "number"}, numbers]})
+
+
+Turn = Annotated[tuple[float, ...], Len(1, 3), BeforeValidator(_as_tuple), number_or_list(1)]
 """A rotation: in two dimensions one number, counter-clockwise; in three a vector along the axis, as long as the angle."""
 
 

@@ -6,6 +6,7 @@ SI units throughout: m, s, kg. A vector with two components makes a two-dimensio
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,13 +20,14 @@ from pydantic.dataclasses import dataclass
 from taichi_rts.bodies import bodies
 from taichi_rts.conditions import AXES, Axis, GravityChange, Inflow, MovingWall
 from taichi_rts.errors import SceneError
-from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
-from taichi_rts.obstacles import SHAPES, ConstantMotion, Keyframes, Obstacle
+from taichi_rts.fields import LinearField
+from taichi_rts.obstacles import Obstacle
 from taichi_rts.particle_fluid import Particles
 from taichi_rts.probes import Gauge, Probe
 from taichi_rts.scene_checks import contradictions
 from taichi_rts.scene_files.reading import SUFFIXES, read_scene_file
-from taichi_rts.shapes import Block, Box, Fluid, Sphere, top_speed
+from taichi_rts.schema import keys_at, schema_of
+from taichi_rts.shapes import Box, Fluid, top_speed
 from taichi_rts.sound import FLOOR, RegionalSound, SoundSpeed
 from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, describe, validated
 
@@ -287,29 +289,6 @@ class Scene:
         return pydantic.TypeAdapter(Scene).dump_python(self, mode="json", exclude_none=True)
 
 
-_PARTS = (
-    Scene,
-    Box,
-    Block,
-    Sphere,
-    Particles,
-    LinearField,
-    TaylorGreen,
-    StandingWave,
-    GravityChange,
-    MovingWall,
-    Inflow,
-    Probe,
-    Gauge,
-    View,
-    RegionalSound,
-    *SHAPES.values(),
-    ConstantMotion,
-    Keyframes,
-)
-_KEYS = [key for cls in _PARTS for key in cls.__dataclass_fields__]  # type: ignore[attr-defined]
-
-
 def load_scene(name: str | Path, *, particles: float | str | None = None, **changes: Any) -> Scene:
     """Return a built-in scene by name, or the scene in a file: TOML, the same in JSON, or SPlisHSPlasH's (docs/scene_files.md).
 
@@ -338,7 +317,12 @@ def scene_from(data: dict[str, Any], source: str = "scene") -> Scene:
     try:
         return pydantic.TypeAdapter(Scene).validate_python(data)
     except pydantic.ValidationError as error:
-        raise SceneError(describe(error, source, _KEYS)) from None
+        raise SceneError(describe(error, source, keys=functools.partial(keys_at, Scene))) from None
+
+
+def scene_schema() -> dict[str, Any]:
+    """Return the JSON Schema of scene files, with which editors complete and check them."""
+    return schema_of(Scene)
 
 
 def scene_names() -> list[str]:

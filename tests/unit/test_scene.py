@@ -337,7 +337,7 @@ def test_toml_file_with_a_sphere(tmp_path):
         (
             "{ gradient = [[-100.0, 0.0], [0.0, 100.0]] }",
             "3",
-            ["fluids.1.velocity: Input should be a valid tuple (got 3)"],
+            ["fluids.1.velocity: a list is needed, such as [0.0, 0.0, 1.0] (got 3)"],
         ),
         ("{ gradient = [[-100.0, 0.0], [0.0, 100.0]] }", "[1, 2, 3]", ["fluids.1: velocity (1.0, 2.0, 3.0) has 3"]),
         ("spacing = 0.1", "spacing = 0.1\nbody_forc = 1", ["body_forc: unknown key; did you mean 'body_force'?"]),
