@@ -32,7 +32,7 @@ from taichi_rts.particle_files.formats import read_particles
 from taichi_rts.particle_files.frame import ParticleFrame
 from taichi_rts.particle_fluid import Particles
 from taichi_rts.probes import Gauge, Probe
-from taichi_rts.scene import Scene, View, load_scene, scene_names
+from taichi_rts.scene import Scene, View, load_scene, scene_names, scene_schema
 from taichi_rts.shapes import Block, Box, Sphere
 from taichi_rts.simulation import Simulation
 from taichi_rts.sound import RegionalSound
@@ -89,5 +89,6 @@ __all__ = [
     "read_particles",
     "save_checkpoint",
     "scene_names",
+    "scene_schema",
     "write_particles",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import sys
 import warnings
 from pathlib import Path
@@ -43,7 +44,7 @@ class Run:
     """
 
     scene: tyro.conf.Positional[str | None] = None
-    """Name of a built-in scene (see `taichi-rts scenes`) or path of a TOML file; by default double_dam_break."""
+    """Name of a built-in scene (see `taichi-rts scenes`) or path of a TOML or SPlisHSPlasH file; by default double_dam_break."""
     arch: Literal["auto", "cuda", "vulkan", "cpu"] = "auto"
     """Where kernels run; auto takes the first of cuda, vulkan, cpu that is there. A named one never falls back."""
     precision: Literal["f32", "f64"] | None = None
@@ -121,7 +122,7 @@ class Run:
     export: tuple[str, ...] = ()
     """Also write particles at each frame, in any of vtu, ply, npz, bgeo, vtkhdf, and the water's surface (docs/files.md)."""
     attributes: tuple[str, ...] = DEFAULT_ATTRIBUTES
-    """What files say of each particle: any of id, velocity, density, pressure, level, step, cell_time, sound_speed."""
+    """What files say of each particle: any of id, velocity, density, pressure, level, step, cell_time, sound_speed, fluid."""
     debug: bool = False
     """Check at run time what steppers promise (nobody is extrapolated, somebody steps in every pass); adds up momentum."""
     gui: bool = False
@@ -270,8 +271,14 @@ def flags(keys: list[str]) -> str:
 class Scenes:
     """List the built-in scenes."""
 
+    schema: bool = False
+    """Print the JSON Schema of scene files instead, for editors (docs/scene_files.md)."""
+
     def __call__(self) -> None:
         """List them."""
+        if self.schema:
+            print(json.dumps(rts.scene_schema(), indent=2))
+            return
         report.print_scenes([rts.load_scene(name) for name in rts.scene_names()])
 
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.errors import SceneError
-from taichi_rts.obstacles import MeshObstacle, rotation_matrix
+from taichi_rts.obstacles import MeshObstacle
+from taichi_rts.rotations import rotation_matrix
 from taichi_rts.solids import DistanceGrid, Solid, grid_nodes
 
 FORMATS = (".obj", ".stl", ".ply")
@@ -38,13 +39,15 @@ def load_mesh(obstacle: MeshObstacle) -> Any:
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     if not np.isfinite(mesh.vertices).all():
         raise SceneError(f"mesh file {obstacle.file!r} has vertices that are no numbers; export it again")
-    if not mesh.is_watertight:
-        _, uses = np.unique(mesh.edges_unique_inverse, return_counts=True)
+    # Closed is a surface whose triangles pass each edge as often one way as the other: four may meet where it touches itself.
+    ways = np.where(mesh.edges[:, 0] < mesh.edges[:, 1], 1.0, -1.0)
+    uses, surplus = np.bincount(mesh.edges_unique_inverse), np.bincount(mesh.edges_unique_inverse, ways)
+    if (uses % 2).any():
         raise SceneError(
-            f"mesh file {obstacle.file!r} is open: {int((uses != 2).sum())} of its edges are not shared by exactly two "
+            f"mesh file {obstacle.file!r} is open: {int((uses % 2).sum())} of its edges are not shared by exactly two "
             "triangles, so it has no inside; close its holes"
         )
-    if not mesh.is_winding_consistent:
+    if surplus.any():
         raise SceneError(f"mesh file {obstacle.file!r} has triangles that face both ways; make its normals consistent")
     if mesh.volume <= 0.0:
         raise SceneError(
@@ -52,7 +55,7 @@ def load_mesh(obstacle: MeshObstacle) -> Any:
             "flip its normals"
         )
     turn = rotation_matrix(np.radians(obstacle.rotation)) if obstacle.rotation else np.eye(3)
-    mesh.vertices = obstacle.scale * mesh.vertices @ turn.T + np.array(obstacle.translation)
+    mesh.vertices = np.array(obstacle.scale) * mesh.vertices @ turn.T + np.array(obstacle.translation)
     return mesh
 
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_rts.errors import SceneError
-from taichi_rts.shapes import Sphere
+from taichi_rts.particle_fluid import Particles
+from taichi_rts.shapes import Block, Sphere
 from taichi_rts.solids import Solid, make_solid
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def _place_faults(scene: Scene, obstacle: Any, solid: Solid) -> list[str]:
     if obstacle.shape == "mesh" and size > FAR_LARGER * float((high - low).max()):
         return [
             f"mesh is {size:g} m across, the domain {(high - low).max():g} m, so its file is in another unit; "
-            f"set scale, 0.001 if it is in mm (now {obstacle.scale:g})"
+            f"set scale, 0.001 if it is in mm (now {max(obstacle.scale):g})"
         ]
     if solid.thickness < scene.spacing * (1 - 1e-6):
         unit = ", or set scale if its file is in another unit" if obstacle.shape == "mesh" else ""
@@ -79,22 +80,27 @@ def _place_faults(scene: Scene, obstacle: Any, solid: Solid) -> list[str]:
 
 def _drowned_faults(scene: Scene, solids: list[tuple[int, Solid]]) -> list[str]:
     """Find fluids of which nothing is left outside the obstacles."""
-    faults = []
-    for n, fluid in enumerate(scene.fluids):
-        if len(fluid.lower) != scene.dim:
-            continue
-        steps = [
-            np.linspace(a, b, max(1, int((b - a) / scene.spacing)) * 2 + 1)[1::2]
-            for a, b in zip(fluid.lower, fluid.upper, strict=True)
-        ]
-        points = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, scene.dim)
-        if isinstance(fluid, Sphere):
-            points = points[np.linalg.norm(points - np.array(fluid.centre), axis=1) <= fluid.radius]
-        for k, solid in solids:
-            near = ((solid.lower < fluid.upper) & (solid.upper > fluid.lower)).all()
-            if near and len(points) and (solid.distance(points) < 0.5 * scene.spacing).all():
-                faults.append(f"fluids.{n}: lies wholly inside obstacles.{k}; move or shrink one of them")
-    return faults
+    return [
+        f"fluids.{n}: lies wholly inside obstacles.{k}; move or shrink one of them"
+        for n, fluid in enumerate(scene.fluids)
+        if len(fluid.lower) == scene.dim
+        for k, solid in solids
+        if is_drowned(fluid, solid, scene.spacing)
+    ]
+
+
+def is_drowned(fluid: Block | Sphere | Particles, solid: Solid, spacing: float) -> bool:
+    """Whether a fluid lies wholly in a solid, or nearer to it than half of `spacing` [m]."""
+    if not ((solid.lower < fluid.upper) & (solid.upper > fluid.lower)).all():
+        return False
+    steps = [
+        np.linspace(a, b, max(1, int((b - a) / spacing)) * 2 + 1)[1::2]
+        for a, b in zip(fluid.lower, fluid.upper, strict=True)
+    ]
+    points = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, len(steps))
+    if isinstance(fluid, Sphere):
+        points = points[np.linalg.norm(points - np.array(fluid.centre), axis=1) <= fluid.radius]
+    return bool(len(points)) and bool((solid.distance(points) < 0.5 * spacing).all())
 
 
 def _text(x: np.ndarray) -> str:

@@ -11,16 +11,21 @@ from pydantic import BeforeValidator, Discriminator, Tag, model_validator
 from pydantic.dataclasses import dataclass
 
 from taichi_rts.errors import SceneError
+from taichi_rts.rotations import Turn, number_or_list, rotation_matrix
 from taichi_rts.shapes import Box
 from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, validated
 
 
-def _as_tuple(value: Any) -> Any:
-    return (value,) if isinstance(value, (int, float)) and not isinstance(value, bool) else value
+def _as_scale(value: Any) -> Any:
+    if not isinstance(value, (int, float)) or isinstance(value, bool):
+        return value
+    if not value > 0.0:
+        raise ValueError(f"{value} must be above 0")  # once, not for each axis
+    return (value,) * 3
 
 
-Turn = Annotated[tuple[float, ...], Len(1, 3), BeforeValidator(_as_tuple)]
-"""A rotation: in two dimensions one number, counter-clockwise; in three a vector along the axis, as long as the angle."""
+Scale = Annotated[tuple[Positive, ...], Len(3, 3), BeforeValidator(_as_scale), number_or_list(3)]
+"""One number, or one for each axis."""
 
 
 class Pieces(NamedTuple):
@@ -241,14 +246,14 @@ class MeshObstacle:
 
     Attributes:
         file: its path; in a scene file relative to that file, in whose folder it must lie.
-        scale: metres per unit of the file.
+        scale: metres per unit of the file, one number or one for each axis.
         rotation: [degrees] about the file's origin, after scaling.
         translation: [m], (3,), after turning.
         motion: how it moves.
     """
 
     file: str
-    scale: Positive = 1.0
+    scale: Scale = (1.0, 1.0, 1.0)
     rotation: Turn | None = None
     translation: Annotated[tuple[float, ...], Len(3, 3)] = (0.0, 0.0, 0.0)
     motion: Motion | None = None
@@ -283,20 +288,6 @@ Obstacle = Annotated[
     ),
 ]
 """A body of any shape; a scene file names it by `shape`."""
-
-
-def rotation_matrix(turn: Any) -> np.ndarray:
-    """Matrix, (dim, dim), of a rotation [rad] given as one number (two dimensions) or as a vector along its axis (three)."""
-    turn = np.asarray(turn, float)
-    if len(turn) == 1:
-        c, s = np.cos(turn[0]), np.sin(turn[0])
-        return np.array([[c, -s], [s, c]])
-    angle = float(np.linalg.norm(turn))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = turn / angle
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
 
 
 def _turn_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -15,7 +15,8 @@ from taichi_rts.errors import SceneError
 from taichi_rts.neighbours import nearest_pair
 from taichi_rts.particle_files.formats import read_particles
 from taichi_rts.particle_files.frame import ParticleFrame
-from taichi_rts.validation import NotNegative, Vector, validated
+from taichi_rts.rotations import Turn, rotation_matrix
+from taichi_rts.validation import Colour, NotNegative, Positive, Vector, validated
 
 LEAST_DISTANCE = 0.1
 """Particles may not lie nearer to each other than this share of the spacing: in violent runs a pair comes as near as 0.24."""
@@ -47,16 +48,23 @@ class Particles:
         velocities: [m/s], (N, dim); None: at rest, or those of the file.
         densities: [kg/m^3], (N,), at the start where density is integrated; None: the rest density, or those of the file.
         file: path of a particle file, instead of arrays.
+        scale, rotation, translation: metres per unit of the file, [degrees] about its origin after scaling, and [m], (dim,),
+            after turning: where the file's particles are put. A rotation turns their velocities as well, which `scale` leaves.
         sha256: what the content must be, as `Scene.to_dict` says it; None: anything.
         kinematic_viscosity: nu [m^2/s]; None: the scene's.
+        colour: of pictures by fluid, "orange" or "#RRGGBB"; None: one of the palette.
     """
 
     positions: Array = None
     velocities: Array = None
     densities: Array = None
     file: str | None = None
+    scale: Positive = 1.0
+    rotation: Turn | None = None
+    translation: Vector | None = None
     sha256: str | None = None
     kinematic_viscosity: NotNegative | None = None
+    colour: Colour | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -75,13 +83,18 @@ class Particles:
             return self  # done: pydantic asks again for each scene that takes them
         if (self.positions is None) == (self.file is None):
             raise ValueError("give either positions or a file")
+        if self.file is None and self._placement:
+            raise ValueError(
+                f"{', '.join(self._placement)}: only a file's particles are put elsewhere; change the positions"
+            )
         frame = self._read(self.file) if self.file is not None else None
         _check_arrays(self.positions, self.velocities, self.densities)
         if self.sha256 not in (None, self.digest):
             raise ValueError(
                 f"the particles of {self.file or 'positions'} are others than those of sha256 {self.sha256}"
             )
-        object.__setattr__(self, "_spacing", frame.spacing if frame else None)
+        spacing = frame.spacing if frame else None
+        object.__setattr__(self, "_spacing", None if spacing is None else spacing * self.scale)
         return self
 
     def _read(self, path: str) -> ParticleFrame:
@@ -91,18 +104,41 @@ class Particles:
             frame = read_particles(path)
         except SceneError as error:
             raise ValueError(str(error)) from None
-        found = {"positions": frame.positions}
-        found |= {"velocities": frame.attributes.get("velocity"), "densities": frame.attributes.get("density")}  # type: ignore[dict-item]
+        velocity = frame.attributes.get("velocity")
+        found = {"positions": self._place(frame.positions), "densities": frame.attributes.get("density")}
+        found["velocities"] = velocity if velocity is None or not self.rotation else velocity @ self._turn.T
         for name, values in found.items():
             object.__setattr__(self, name, _frozen_array(values))
         return frame
 
+    @property
+    def _placement(self) -> dict[str, Any]:
+        """What is said about where a file's particles are put."""
+        given = {"scale": self.scale, "rotation": self.rotation, "translation": self.translation}
+        return {name: value for name, value in given.items() if value not in (None, 1.0)}
+
+    @property
+    def _turn(self) -> np.ndarray:
+        return rotation_matrix(np.radians(self.rotation))  # type: ignore[arg-type]
+
+    def _place(self, x: np.ndarray) -> np.ndarray:
+        """Where positions of the file, (N, dim), are put [m]."""
+        dim = x.shape[1]
+        for name, value, needed in (
+            ("rotation", self.rotation, 1 if dim == 2 else 3),
+            ("translation", self.translation, dim),
+        ):
+            if value is not None and len(value) != needed:
+                raise ValueError(f"{name} {value} has {len(value)} components; in {dim} dimensions give {needed}")
+        x = np.asarray(x, float) * self.scale
+        return (x @ self._turn.T if self.rotation else x) + np.asarray(self.translation or 0.0)
+
     @model_serializer
     def _describe(self) -> dict[str, Any]:
         """Plain data: the file, or how many particles there are, with the hash that tells them from others."""
-        found = {"file": self.file} if self.file is not None else {"count": self.count}
-        viscosity = {} if self.kinematic_viscosity is None else {"kinematic_viscosity": self.kinematic_viscosity}
-        return found | {"sha256": self.digest} | viscosity
+        found = {"file": self.file, **self._placement} if self.file is not None else {"count": self.count}
+        own = {"kinematic_viscosity": self.kinematic_viscosity, "colour": self.colour}
+        return found | {"sha256": self.digest} | {name: value for name, value in own.items() if value is not None}
 
     def __repr__(self) -> str:
         return f"Particles({self.file!r})" if self.file is not None else f"Particles({self.count})"
@@ -110,7 +146,8 @@ class Particles:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Particles):
             return NotImplemented
-        return (self.digest, self.kinematic_viscosity) == (other.digest, other.kinematic_viscosity)
+        mine, its = ((each.digest, each.kinematic_viscosity, each.colour) for each in (self, other))
+        return mine == its
 
     def __hash__(self) -> int:
         return hash(self.digest)

@@ -64,14 +64,16 @@ class WallLayer:
 class Sample:
     """Particles at the start: positions [m] and velocities [m/s], (N, dim), densities [kg/m^3], viscosities [m^2/s], (N,).
 
-    All have one mass [kg]. `walls` are the wall particles, (M,), and `owners`, (M,), the number of the moving wall that each
-    is part of, -1 for those at rest. `obstacles` are the wall particles of each obstacle, as it stands at time 0.
+    `fluids`, (N,), is the place of each particle's fluid in the scene. All have one mass [kg]. `walls` are the wall particles,
+    (M,), and `owners`, (M,), the number of the moving wall that each is part of, -1 for those at rest. `obstacles` are the wall
+    particles of each obstacle, as it stands at time 0.
     """
 
     positions: np.ndarray
     velocities: np.ndarray
     densities: np.ndarray
     viscosities: np.ndarray
+    fluids: np.ndarray
     mass: float
     walls: WallLayer
     owners: np.ndarray
@@ -90,6 +92,7 @@ def sample(scene: Scene) -> Sample:
         np.concatenate(moving),
         np.concatenate([rho for _, rho in pressed]),
         np.concatenate(viscosities),
+        np.repeat(np.arange(len(positions), dtype=np.int32), [len(x) for x in positions]),
         calibrate_mass(scene),
         *line_walls(scene),
         line_obstacles(scene, solids),

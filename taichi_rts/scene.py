@@ -6,8 +6,8 @@ SI units throughout: m, s, kg. A vector with two components makes a two-dimensio
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -20,19 +20,16 @@ from pydantic.dataclasses import dataclass
 from taichi_rts.bodies import bodies
 from taichi_rts.conditions import AXES, Axis, GravityChange, Inflow, MovingWall, Outlet
 from taichi_rts.errors import SceneError
-from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
-from taichi_rts.obstacles import SHAPES, ConstantMotion, Keyframes, Obstacle
+from taichi_rts.fields import LinearField
+from taichi_rts.obstacles import Obstacle
 from taichi_rts.particle_fluid import Particles
 from taichi_rts.probes import Gauge, Probe
 from taichi_rts.scene_checks import contradictions
-from taichi_rts.shapes import Block, Box, Fluid, Sphere, top_speed
+from taichi_rts.scene_files.reading import SUFFIXES, read_scene_file
+from taichi_rts.schema import keys_at, schema_of
+from taichi_rts.shapes import Box, Fluid, top_speed
 from taichi_rts.sound import FLOOR, RegionalSound, SoundSpeed
 from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, describe, validated
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 LARGEST_RATIO = 32.0  # of sound speeds in one scene
 WORTHWHILE = 2.0
@@ -154,6 +151,16 @@ class Scene:
         own = (fluid.kinematic_viscosity for fluid in self.fluids)
         inflow = (self.kinematic_viscosity,) * bool(self.inflows)
         return (*(self.kinematic_viscosity if nu is None else nu for nu in own), *inflow)
+
+    @property
+    def fluid_names(self) -> tuple[str, ...]:
+        """What legends call each fluid, (len(fluids),), and what flows in, if anything does."""
+        return (*(f"fluid {k}" for k in range(1, len(self.fluids) + 1)), *("inflow",) * bool(self.inflows))
+
+    @property
+    def fluid_colours(self) -> tuple[str | None, ...]:
+        """Colour of each of `fluid_names`, None for the palette's."""
+        return (*(fluid.colour for fluid in self.fluids), *(None,) * bool(self.inflows))
 
     @property
     def regional_sound(self) -> RegionalSound | None:
@@ -284,50 +291,22 @@ class Scene:
         return pydantic.TypeAdapter(Scene).dump_python(self, mode="json", exclude_none=True)
 
 
-_PARTS = (
-    Scene,
-    Box,
-    Block,
-    Sphere,
-    Particles,
-    LinearField,
-    TaylorGreen,
-    StandingWave,
-    GravityChange,
-    MovingWall,
-    Inflow,
-    Outlet,
-    Probe,
-    Gauge,
-    View,
-    RegionalSound,
-    *SHAPES.values(),
-    ConstantMotion,
-    Keyframes,
-)
-_KEYS = [key for cls in _PARTS for key in cls.__dataclass_fields__]  # type: ignore[attr-defined]
-
-
 def load_scene(name: str | Path, *, particles: float | str | None = None, **changes: Any) -> Scene:
-    """Return a built-in scene by name, or the scene in a TOML file.
+    """Return a built-in scene by name, or the scene in a file: TOML, the same in JSON, or SPlisHSPlasH's (docs/scene_files.md).
 
     `particles` (a number, or text such as "1.5M") sets the spacing so that about as many fluid particles result;
     other keywords replace fields of the scene. Raises `SceneError` for an unknown name, an unreadable file, an
     unknown key or an invalid value.
     """
     path = Path(name)
-    if path.suffix != ".toml":
+    if path.suffix not in SUFFIXES:
         path = BUILT_IN / f"{name}.toml"
         if not path.is_file():
             known = ", ".join(scene_names())
-            raise SceneError(f"scene {str(name)!r} is unknown; choose one of {known}, or name a .toml file")
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SceneError(f"scene file {str(path)!r} cannot be read: {error.strerror}; check the path") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SceneError(f"scene file {str(path)!r} is not valid TOML: {error}") from None
-    data = with_files_beside({"name": path.stem} | data, path)
+            raise SceneError(
+                f"scene {str(name)!r} is unknown; choose one of {known}, or name a .toml file, or a .json file"
+            )
+    data = read_scene_file(path)
     if particles is not None:
         if "spacing" in changes:
             raise SceneError(f"particles {particles!r} and spacing {changes['spacing']!r} are both given; give one")
@@ -335,36 +314,17 @@ def load_scene(name: str | Path, *, particles: float | str | None = None, **chan
     return scene_from(data | changes, str(path))
 
 
-def with_files_beside(data: dict[str, Any], path: Path) -> dict[str, Any]:
-    """Return the data of the scene file `path` with the files of its particles and meshes relative to its folder.
-
-    Raises `SceneError` for a file outside that folder.
-    """
-    folder = path.resolve().parent
-    resolved: dict[str, Any] = {}
-    for key in ("fluids", "obstacles"):
-        parts = data.get(key)
-        if not isinstance(parts, list):
-            continue
-        resolved[key] = []
-        for k, part in enumerate(parts):
-            if isinstance(part, dict) and isinstance(part.get("file"), str):
-                file = (folder / part["file"]).resolve()
-                if not file.is_relative_to(folder):
-                    raise SceneError(
-                        f"{path}: {key}.{k}.file: {part['file']!r} leaves the scene's folder {str(folder)!r}; put it there"
-                    )
-                part = part | {"file": str(file)}
-            resolved[key].append(part)
-    return data | resolved
-
-
 def scene_from(data: dict[str, Any], source: str = "scene") -> Scene:
     """Build a `Scene` from plain data; raises `SceneError` that lists every fault with its path."""
     try:
         return pydantic.TypeAdapter(Scene).validate_python(data)
     except pydantic.ValidationError as error:
-        raise SceneError(describe(error, source, _KEYS)) from None
+        raise SceneError(describe(error, source, keys=functools.partial(keys_at, Scene))) from None
+
+
+def scene_schema() -> dict[str, Any]:
+    """Return the JSON Schema of scene files, with which editors complete and check them."""
+    return schema_of(Scene)
 
 
 def scene_names() -> list[str]:

@@ -12,7 +12,7 @@ from pydantic.dataclasses import dataclass
 from taichi_rts.errors import SceneError
 from taichi_rts.fields import Field, Velocity
 from taichi_rts.particle_fluid import Particles
-from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, validated
+from taichi_rts.validation import FROZEN, Colour, NotNegative, Positive, Vector, validated
 
 
 @validated(SceneError)
@@ -44,13 +44,14 @@ class Block:
     """A block of fluid between two corners `lower` and `upper` [m], (dim,).
 
     It moves at `velocity` [m/s]: a vector (dim,) or a field of `taichi_rts.fields`; None: at rest. `kinematic_viscosity` is
-    its nu [m^2/s]; None: the scene's.
+    its nu [m^2/s]; None: the scene's. `colour` is its colour in pictures by fluid, "orange" or "#RRGGBB"; None: the palette's.
     """
 
     lower: Vector
     upper: Vector
     velocity: Velocity | None = None
     kinematic_viscosity: NotNegative | None = None
+    colour: Colour | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Block:
@@ -79,13 +80,14 @@ class Sphere:
     """A sphere of fluid, in two dimensions a disc, around `centre` [m], (dim,), with `radius` [m].
 
     It moves at `velocity` [m/s]: a vector (dim,) or a field of `taichi_rts.fields`; None: at rest. `kinematic_viscosity` is
-    its nu [m^2/s]; None: the scene's.
+    its nu [m^2/s]; None: the scene's. `colour` is its colour in pictures by fluid, "orange" or "#RRGGBB"; None: the palette's.
     """
 
     centre: Vector
     radius: Positive
     velocity: Velocity | None = None
     kinematic_viscosity: NotNegative | None = None
+    colour: Colour | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Sphere:

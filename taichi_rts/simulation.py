@@ -82,6 +82,8 @@ class Simulation:
     added up.
     """
 
+    transient = frozenset({"_fluids"})
+
     def __init__(self, scene: Scene, stepper: Stepper | None = None, *, debug: bool = False) -> None:
         backend = backends.current()
         self.stepper = stepper if stepper is not None else cast(Stepper, Regional())
@@ -119,6 +121,7 @@ class Simulation:
             self.medium = dataclasses.replace(self.medium, equation_of_state=law)
         self.near = Neighbourhood(capacity, scene.dim, backend, needs, geometry)
         self._obstacle_layers = start.obstacles
+        self._fluids = start.fluids
         self._meter: ForceMeter | None = None
         self.walls = make_walls(scene, start, self.near, self.grid, backend)
         windows = None
@@ -353,6 +356,10 @@ class Simulation:
     def levels(self) -> np.ndarray:
         """Levels n, (N,): each particle's step is n base steps. In order of particle id."""
         return self.state()[3]
+
+    def fluids(self) -> np.ndarray:
+        """Place of each particle's fluid in the scene, (N,), len(fluids) for what has flowed in. In order of particle id."""
+        return np.pad(self._fluids, (0, self.count - len(self._fluids)), constant_values=len(self.scene.fluids))
 
     def steps(self) -> np.ndarray:
         """Steps [s], (N,): level times base step (`Uniform(adaptive=True)`: at most). In order of particle id."""

@@ -16,8 +16,8 @@ from taichi_rts.obstacles import (
     MeshObstacle,
     PolygonObstacle,
     SphereObstacle,
-    rotation_matrix,
 )
+from taichi_rts.rotations import rotation_matrix
 
 GRID_STEPS = 2  # nodes of a signed-distance grid per spacing
 MOST_NODES = 2e7

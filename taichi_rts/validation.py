@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import difflib
 import functools
-from collections.abc import Callable, Iterable
+import re
+from collections.abc import Callable, Iterable, Sequence
 from typing import Annotated, Any, TypeVar
 
 import pydantic
 from annotated_types import Len
-from pydantic import ConfigDict, Field
+from PIL import ImageColor
+from pydantic import AfterValidator, ConfigDict, Field
 
 from taichi_rts.errors import Error
 
@@ -17,17 +19,44 @@ FROZEN = ConfigDict(extra="forbid", allow_inf_nan=False, arbitrary_types_allowed
 Vector = Annotated[tuple[float, ...], Len(2, 3)]
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
+Colour = Annotated[str, AfterValidator(lambda name: _known_colour(name))]
+"""A colour by its name in HTML or as "#RRGGBB"."""
 T = TypeVar("T", bound=type)
+Keys = Callable[[Sequence[str | int]], list[str]]
+UNITS = {
+    **{"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "s": 1.0, "ms": 1e-3, "min": 60.0, "kg": 1.0, "g": 1e-3, "t": 1e3},
+    **{
+        "m/s": 1.0,
+        "cm/s": 1e-2,
+        "mm/s": 1e-3,
+        "km/h": 1 / 3.6,
+        "m/s^2": 1.0,
+        "cm/s^2": 1e-2,
+        "m^2/s": 1.0,
+        "mm^2/s": 1e-6,
+    },
+    **{"kg/m^3": 1.0, "g/cm^3": 1e3, "kg/l": 1e3, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "deg": 1.0, "°": 1.0},
+}
+"""Units that people write behind numbers, in SI units (angles in degrees): only to say what to write instead."""
+QUANTITY = re.compile(r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)\s*([^\d\s.][^\s]*)")
 
 
-def describe(error: pydantic.ValidationError, subject: str, names: Iterable[str] = ()) -> str:
+def _known_colour(name: str) -> str:
+    try:
+        ImageColor.getrgb(name)
+    except ValueError:
+        raise ValueError(f"{name!r} is no colour; give a name such as 'orange', or '#RRGGBB'") from None
+    return name
+
+
+def describe(error: pydantic.ValidationError, subject: str, names: Iterable[str] = (), keys: Keys | None = None) -> str:
     """List all findings of `error`, one a line: path, what is wrong, the value given, a near name for an unknown key.
 
+    `names` are those of the description's own fields, `keys` gives those of the part at a path.
     Tags in angle brackets, which pydantic puts into the path to say which member of a union it took, are left out.
     """
     lines = []
     fields = list(names)
-    known = sorted(set(fields))
     items = error.errors(include_url=False)
     for item in items:
         if item["type"] == "too_short" and any(_lies_within(other["loc"], item["loc"]) for other in items):
@@ -38,15 +67,31 @@ def describe(error: pydantic.ValidationError, subject: str, names: Iterable[str]
         path = ".".join(str(part) for part in parts)
         message = item["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
         if item["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
+            known = sorted(fields) if keys is None else keys(item["loc"][:-1])
             near = difflib.get_close_matches(str(item["loc"][-1]), known, n=1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
             message = f"unknown key{hint} (known: {', '.join(known)})"
         elif item["type"] in ("missing", "missing_argument"):
             message = "missing; give it a value"
+        elif item["type"] == "tuple_type" and isinstance(item["input"], dict):
+            message = f"is one table; write it as a list of tables, [[{path}]]"
+        elif item["type"] == "tuple_type":
+            message = f"a list is needed, such as [0.0, 0.0, 1.0] (got {item['input']!r})"
+        elif item["type"] == "dataclass_type" and keys is not None:
+            message = f"a table with {', '.join(keys(item['loc']))} is needed (got {item['input']!r})"
+        elif isinstance(item["input"], str) and (value := in_si(item["input"])) is not None:
+            message = f"{item['input']!r} is a text; give a plain number in SI units, {value:.9g}"
         elif item["type"] not in ("value_error", "assertion_error"):
             message = f"{message} (got {item['input']!r})"
         lines.append(f"{path}: {message}" if path else message)
     return f"{subject}: " + "\n  ".join(lines)
+
+
+def in_si(text: str) -> float | None:
+    """Return what a quantity such as "20 mm" is in SI units; None for what is no number with a known unit."""
+    found = QUANTITY.fullmatch(text.strip())
+    factor = UNITS.get(found[2].replace("²", "^2").replace("³", "^3")) if found else None
+    return float(found[1]) * factor if found and factor is not None else None
 
 
 def _lies_within(inner: tuple[Any, ...], outer: tuple[Any, ...]) -> bool:

@@ -25,6 +25,7 @@ ATTRIBUTES: dict[str, Callable[[Simulation, State], np.ndarray]] = {
     "step": lambda sim, state: sim.steps(),
     "cell_time": lambda sim, state: sim.cell_times(),
     "sound_speed": lambda sim, state: sim.sound_speeds(),
+    "fluid": lambda sim, state: sim.fluids(),
 }
 """What can be known of a particle, by name: to add one, write a function of a simulation and its `state()`."""
 DEFAULT_ATTRIBUTES = ("id", "velocity", "density", "pressure", "level")

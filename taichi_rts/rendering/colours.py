@@ -1,6 +1,7 @@
 """From levels and fields to colours (sRGB, 0 to 1), in NumPy only."""
 
 import numpy as np
+from PIL import ImageColor
 
 from taichi_rts.errors import RenderError
 
@@ -100,6 +101,17 @@ def _by_sound(sounds, top_sound, **_):
     return scalar_colours(sounds, *sound_range(sounds, top_sound))
 
 
+def fluid_colours(names, palette: str = "default") -> np.ndarray:
+    """Return (K, 3) colours of K fluids: by name, as HTML has it, or for None the palette's of the fluid's place."""
+    own = level_colours(np.arange(1, len(names) + 1), palette)
+    given = [None if name is None else np.array(ImageColor.getrgb(name)[:3], np.float32) / 255 for name in names]
+    return np.array([one if chosen is None else chosen for one, chosen in zip(own, given, strict=True)])
+
+
+def _by_fluid(fluids, fluid_tints, **_):
+    return _needed("fluid", "fluid_tints", fluid_tints)[_needed("fluid", "fluids", fluids)]
+
+
 def _plain(count, **_):
     return np.tile(np.asarray(PLAIN, np.float32), (count, 1))
 
@@ -111,6 +123,7 @@ _MODES = {
     "speed": _by_speed,
     "density": _by_density,
     "sound": _by_sound,
+    "fluid": _by_fluid,
     "plain": _plain,
 }
 MODES = tuple(_MODES)
@@ -153,6 +166,8 @@ def colour_by(
     steps=None,
     leads=None,
     sounds=None,
+    fluids=None,
+    fluid_tints=None,
     rest_density: float = 1000.0,
     max_speed: float | None = None,
     longest_step: float | None = None,
@@ -160,13 +175,16 @@ def colour_by(
     palette: str = "default",
     doubling: bool = False,
 ) -> np.ndarray:
-    """Return (N, 3) float32 colours; `mode` is one of `MODES`, speeds, sounds [m/s], densities [kg/m^3], steps, leads [s]."""
+    """Return (N, 3) float32 colours; `mode` is one of `MODES`, speeds, sounds [m/s], densities [kg/m^3], steps, leads [s].
+
+    `fluids` are the places, (N,), of particles' colours in `fluid_tints`, (K, 3).
+    """
     choose = _choose("colour mode", mode, _MODES)
-    given = [values for values in (levels, speeds, densities, steps, leads, sounds) if values is not None]
+    given = [values for values in (levels, speeds, densities, steps, leads, sounds, fluids) if values is not None]
     if not given:
         raise RenderError(
             f"colour mode {mode!r} got no array, and needs at least one to know the number of particles: "
-            "pass levels=, speeds=, densities=, steps=, leads= or sounds="
+            "pass levels=, speeds=, densities=, steps=, leads=, sounds= or fluids="
         )
     return choose(
         levels=levels,
@@ -175,6 +193,8 @@ def colour_by(
         steps=steps,
         leads=leads,
         sounds=sounds,
+        fluids=fluids,
+        fluid_tints=fluid_tints,
         rest_density=rest_density,
         max_speed=max_speed,
         longest_step=longest_step,

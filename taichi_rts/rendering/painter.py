@@ -15,7 +15,7 @@ from taichi_rts.rendering.splatter import Splatter
 from taichi_rts.scene import Scene
 from taichi_rts.simulation import Simulation
 
-Mode = Literal["level", "step", "lead", "speed", "density", "sound", "plain"]
+Mode = Literal["level", "step", "lead", "speed", "density", "sound", "fluid", "plain"]
 BAR_STEPS = 64
 LEGEND_ROWS = 8  # with more levels than that the legend leaves out those that nobody has
 
@@ -90,6 +90,8 @@ class Painter:
             steps=sim.steps() if mode == "step" else None,
             leads=sim.leads() if mode == "lead" else None,
             sounds=sim.sound_speeds() if mode == "sound" else None,
+            fluids=sim.fluids() if mode == "fluid" else None,
+            fluid_tints=self._fluid_tints() if mode == "fluid" else None,
             rest_density=self.scene.rest_density,
             max_speed=self.top_speed,
             longest_step=longest_lead(sim) if mode == "lead" else longest_step(sim),
@@ -98,15 +100,24 @@ class Painter:
             doubling=sim.schedule.levels_double,
         )
 
+    def _fluid_tints(self) -> np.ndarray:
+        return colours.fluid_colours(self.scene.fluid_colours, self.options.palette)
+
     def _label(self, image: np.ndarray, sim: Simulation, level: np.ndarray) -> np.ndarray:
         lines = [f"t = {sim.time:.3f} s", f"Δt_b = {milliseconds(sim.base_step)} ms", f"{sim.count:,} particles"]
-        entries = self._entries(sim, level) if self.options.colour_by == "level" else []
+        entries = self._entries(sim, level) if self.options.colour_by in ("level", "fluid") else []
         image = legend.draw_legend(image, self.title, entries, lines)
         bar = _BARS.get(self.options.colour_by)
         return bar(self, image, sim) if bar else image
 
     def _entries(self, sim: Simulation, level: np.ndarray) -> list[tuple[str, Any, float]]:
-        """One entry a colour of levels, with the share of particles that have it now."""
+        """One entry a colour of levels or fluids, with the share of particles that have it now."""
+        if self.options.colour_by == "fluid":
+            tints = self._fluid_tints()
+            counts = np.bincount(sim.fluids(), minlength=len(tints)) / max(1, sim.count)
+            return [
+                (name, tuple(t), share) for name, t, share in zip(self.scene.fluid_names, tints, counts, strict=True)
+            ]
         shares = np.bincount(level, minlength=sim.schedule.levels + 1)[1:] / max(1, len(level))
         classes = level_classes(shares, sim.schedule.levels_double)
         if sim.schedule.levels_double and len(classes) > LEGEND_ROWS:

@@ -337,7 +337,7 @@ def test_toml_file_with_a_sphere(tmp_path):
         (
             "{ gradient = [[-100.0, 0.0], [0.0, 100.0]] }",
             "3",
-            ["fluids.1.velocity: Input should be a valid tuple (got 3)"],
+            ["fluids.1.velocity: a list is needed, such as [0.0, 0.0, 1.0] (got 3)"],
         ),
         ("{ gradient = [[-100.0, 0.0], [0.0, 100.0]] }", "[1, 2, 3]", ["fluids.1: velocity (1.0, 2.0, 3.0) has 3"]),
         ("spacing = 0.1", "spacing = 0.1\nbody_forc = 1", ["body_forc: unknown key; did you mean 'body_force'?"]),
@@ -430,3 +430,88 @@ def test_presets_of_the_regional_stepper():
     assert rts.Regional(preset="paper", levels=5, courant=0.2).resolved("levels") == 5
     assert rts.Regional(preset="paper", levels=5, courant=0.2).resolved("courant") == 0.2
     assert rts.Regional(levels=1).resolved("courant") == rts.Uniform().courant
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({"spacing": "20 mm"}, "spacing: '20 mm' is a text; give a plain number in SI units, 0.02"),
+        ({"sound_speed": "72 km/h"}, "sound_speed: '72 km/h' is a text; give a plain number in SI units, 20"),
+        ({"gravity": [0, "-981 cm/s²"]}, "gravity.1: '-981 cm/s²' is a text; give a plain number in SI units, -9.81"),
+        ({"rest_density": "1 g/cm^3"}, "rest_density: '1 g/cm^3' is a text; give a plain number in SI units, 1000"),
+        (
+            {"end_time": "2 parsecs"},
+            "end_time: Input should be a valid number, unable to parse string as a number (got ",
+        ),
+        ({"gravity": -9.81}, "gravity: a list is needed, such as [0.0, 0.0, 1.0] (got -9.81)"),
+        ({"fluids": {"lower": [0, 0]}}, "fluids: is one table; write it as a list of tables, [[fluids]]"),
+        ({"domain": [1, 1]}, "domain: a table with lower, upper is needed (got [1, 1])"),
+        (
+            {"view": {"azimut": 3}},
+            "view.azimut: unknown key; did you mean 'azimuth'? (known: azimuth, elevation, eye, ",
+        ),
+        (
+            {"fluids": [{"lower": [0, 0], "upper": [1, 1], "colour": "bleu"}]},
+            "fluids.0.colour: 'bleu' is no colour; give a name such as 'orange', or '#RRGGBB'",
+        ),
+        (
+            {"obstacles": [{"shape": "sphere", "centre": [0, 0], "radius": 1, "motion": {"velocty": [1, 0]}}]},
+            "obstacles.0.motion.velocty: unknown key; did you mean 'velocity'? (known: angular_velocity, pivot, start, ",
+        ),
+    ],
+)
+def test_wrong_units_and_shapes_of_values_say_what_to_write(changes, line):
+    data = {
+        "spacing": 0.1,
+        "domain": {"lower": [0, 0], "upper": [1, 1]},
+        "fluids": [{"lower": [0, 0], "upper": [1, 1]}],
+    }
+    with pytest.raises(rts.SceneError) as caught:
+        scene_from(data | changes, "my.toml")
+    assert f"my.toml: {line}" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_scene_with_everything_comes_back_from_plain_data(tmp_path):
+    cloud = np.array([[0.65, 0.85], [0.75, 0.85]])
+    rts.write_particles(tmp_path / "cloud.ply", rts.ParticleFrame(cloud, {}, 0.0, 0.1))
+    everything = scene(
+        fluids=[
+            rts.Block((0, 0), (0.3, 0.3), velocity=rts.LinearField(((0, 1), (1, 0))), colour="red"),
+            rts.Block((0.3, 0), (0.6, 0.3), kinematic_viscosity=0.1),
+            rts.Sphere((0.3, 0.7), 0.1, velocity=(1, 0), colour="#00ff00"),
+            rts.Particles(file=str(tmp_path / "cloud.ply"), translation=(0.0, 0.05), colour="blue"),
+        ],
+        gravity=(0, -1),
+        gravity_changes=[rts.GravityChange(0.5, (1, 0))],
+        body_force=rts.LinearField(((-1, 0), (0, -1)), value=(0.1, 0)),
+        sound_speed=20,
+        kernel="wendland_c2",
+        support_ratio=2.5,
+        rest_density=900,
+        artificial_viscosity=0.1,
+        kinematic_viscosity=0.01,
+        hydrostatic=True,
+        moving_walls=[rts.MovingWall("x+", (0, 1), (0, -0.1))],
+        inflows=[rts.Inflow((0, 0.5), (0, 0.7), (1, 0), 0.1, 0.2)],
+        probes=[rts.Probe((0.1, 0.1), "low")],
+        gauges=[rts.Gauge((0.2, 0))],
+        obstacles=[
+            rts.BoxObstacle((0.6, 0.3), (0.8, 0.5), rotation=10, motion=rts.ConstantMotion((0.1, 0), 0.5, stop=1)),
+            rts.SphereObstacle((0.8, 0.2), 0.1, rts.Keyframes((0, 1), ((0, 0), (0.1, 0)), (0, 90))),
+            rts.PolygonObstacle(((0.4, 0.4), (0.55, 0.4), (0.4, 0.55))),
+        ],
+        end_time=2,
+        view=rts.View(zoom=2),
+        name="all",
+        description="everything",
+    )
+    plain = json.loads(json.dumps(everything.to_dict()))
+    assert scene_from(plain) == everything
+    left_out = {"periodic", "walls", "background_pressure", "density"}  # their defaults, which go with the rest
+    unlike = {
+        f.name for f in dataclasses.fields(rts.Scene) if getattr(everything, f.name) != getattr(scene(), f.name, 0)
+    }
+    assert set(rts.Scene.__dataclass_fields__) - unlike <= left_out | {"domain", "spacing"}
+    np.testing.assert_allclose(everything.fluids[3].positions, cloud + np.array([0.0, 0.05]))
+    assert everything.fluid_colours == ("red", None, "#00ff00", "blue", None)

@@ -7,6 +7,7 @@ from taichi_rts.rendering.colours import (
     PALETTES,
     PLAIN,
     colour_by,
+    fluid_colours,
     level_colours,
     octaves,
     scalar_colours,
@@ -77,13 +78,16 @@ def test_modes():
     assert step_range(steps, None) == (0, 0.004)
     rest = colour_by("density", densities=np.array([1000.0]), rest_density=1000.0)
     assert np.allclose(rest, 0xF2 / 255, atol=5e-3)
+    tints = fluid_colours(["#102030", None])
+    assert np.allclose(tints, [[16 / 255, 32 / 255, 48 / 255], level_colours([2])[0]])
+    assert np.array_equal(colour_by("fluid", fluids=np.array([1, 0, 1]), fluid_tints=tints), tints[[1, 0, 1]])
     plain = colour_by("plain", levels=levels)
     assert plain.shape == (3, 3)
     assert np.allclose(plain, PLAIN)
 
 
 def test_unknown_names_list_the_choices():
-    with pytest.raises(RenderError, match=r"'vorticity'.*level, step, lead, speed, density, sound, plain"):
+    with pytest.raises(RenderError, match=r"'vorticity'.*level, step, lead, speed, density, sound, fluid, plain"):
         colour_by("vorticity", levels=[1])
     with pytest.raises(RenderError, match="default, paper"):
         level_colours([1], "nature")
