@@ -22,6 +22,8 @@ FAR = 0x7F000000  # bit pattern of a depth no particle has (1.7e38 m)
 NOBODY = 0x7FFFFFFF
 SAME_DEPTH = 2  # units in the last place: two kernels may round the same formula differently
 SMALLEST = 0.71  # [pixels] radius below which a sphere could fall between pixel centres and vanish
+TILE = 8  # [pixels] side of the tiles that hidden spheres are found by
+STRIDES = (16, 4, 2, 1)  # one of so many spheres is drawn at first, which hides most of the others
 
 
 @ti.kernel
@@ -103,21 +105,72 @@ def splat(sprite, number, lens, width, height, depth: ti.template(), nearest: ti
                     ti.atomic_min(depth[p], bits)
 
 
+@ti.func
+def may_be_seen(sprite, lens, width, height, tiles: ti.template()):
+    """Whether a sphere's nearest point is in front of the farthest depth of a tile that it touches."""
+    seen = False
+    if sprite[3] > 0:
+        front = ti.bit_cast(sprite[2] - sprite[3] * metres_per_pixel(sprite[2], lens), ti.i32)
+        columns = (width + TILE - 1) // TILE
+        left = ti.max(ti.cast(sprite[0] - sprite[3], ti.i32), 0) // TILE
+        right = ti.min(ti.cast(sprite[0] + sprite[3], ti.i32), width - 1) // TILE
+        top = ti.max(ti.cast(sprite[1] - sprite[3], ti.i32), 0) // TILE
+        bottom = ti.min(ti.cast(sprite[1] + sprite[3], ti.i32), height - 1) // TILE
+        for row in range(top, bottom + 1):
+            for column in range(left, right + 1):
+                if front <= tiles[row * columns + column] + SAME_DEPTH:
+                    seen = True
+    return seen
+
+
 @ti.kernel
-def splat_depths(sprites: Vectors4, count: ti.i32, lens: vec4, width: ti.i32, height: ti.i32, depth: Ints):
-    """Enter the least depth of all spheres in every pixel."""
-    for i in range(count):
-        if sprites[i][3] > 0:
-            splat(sprites[i], i, lens, width, height, depth, depth, False)
+def measure_tiles(depth: Ints, width: ti.i32, height: ti.i32, tiles: Ints):
+    """Enter the farthest depth of every tile of TILE x TILE pixels."""
+    columns = (width + TILE - 1) // TILE
+    for t in range(tiles.shape[0]):
+        row = t // columns * TILE
+        column = t % columns * TILE
+        farthest = 0
+        for y in range(row, ti.min(row + TILE, height)):
+            for x in range(column, ti.min(column + TILE, width)):
+                farthest = ti.max(farthest, depth[y * width + x])
+        tiles[t] = farthest
+
+
+@ti.kernel
+def splat_depths(
+    sprites: Vectors4,
+    count: ti.i32,
+    stride: ti.i32,
+    lens: vec4,
+    width: ti.i32,
+    height: ti.i32,
+    tiles: Ints,
+    depth: Ints,
+):
+    """Enter the least depth of all spheres, or of one in each `stride` of them, in every pixel."""
+    for k in range((count + stride - 1) // stride):
+        # which one is scattered, since every n-th of a lattice could be one plane of it
+        i = k * stride + ((k * 747796405 >> 8) & 0xFFFF) % stride
+        if i < count:
+            if may_be_seen(sprites[i], lens, width, height, tiles):
+                splat(sprites[i], i, lens, width, height, depth, depth, False)
 
 
 @ti.kernel
 def splat_numbers(
-    sprites: Vectors4, count: ti.i32, lens: vec4, width: ti.i32, height: ti.i32, depth: Ints, nearest: Ints
+    sprites: Vectors4,
+    count: ti.i32,
+    lens: vec4,
+    width: ti.i32,
+    height: ti.i32,
+    tiles: Ints,
+    depth: Ints,
+    nearest: Ints,
 ):
     """Enter the number of the nearest sphere in every pixel; of several at one depth, the lowest number."""
     for i in range(count):
-        if sprites[i][3] > 0:
+        if may_be_seen(sprites[i], lens, width, height, tiles):
             splat(sprites[i], i, lens, width, height, depth, nearest, True)
 
 
