@@ -100,6 +100,11 @@ def _by_sound(sounds, top_sound, **_):
     return scalar_colours(sounds, *sound_range(sounds, top_sound))
 
 
+def _by_pressure(pressures, top_pressure, **_):
+    pressures = _needed("pressure", "pressures", pressures)
+    return scalar_colours(pressures, *pressure_range(pressures, top_pressure))
+
+
 def _plain(count, **_):
     return np.tile(np.asarray(PLAIN, np.float32), (count, 1))
 
@@ -111,6 +116,7 @@ _MODES = {
     "speed": _by_speed,
     "density": _by_density,
     "sound": _by_sound,
+    "pressure": _by_pressure,
     "plain": _plain,
 }
 MODES = tuple(_MODES)
@@ -124,6 +130,11 @@ def speed_range(speeds, max_speed: float | None) -> tuple[float, float]:
 def sound_range(sounds, top_sound: float | None) -> tuple[float, float]:
     """Return the range that mode "sound" shows [m/s]."""
     return 0.0, _upper(sounds, top_sound)
+
+
+def pressure_range(pressures, top_pressure: float | None) -> tuple[float, float]:
+    """Return the range that mode "pressure" shows [Pa]."""
+    return 0.0, _upper(pressures, top_pressure)
 
 
 def step_range(steps, longest_step: float | None) -> tuple[float, float]:
@@ -153,20 +164,25 @@ def colour_by(
     steps=None,
     leads=None,
     sounds=None,
+    pressures=None,
     rest_density: float = 1000.0,
     max_speed: float | None = None,
     longest_step: float | None = None,
     top_sound: float | None = None,
+    top_pressure: float | None = None,
     palette: str = "default",
     doubling: bool = False,
 ) -> np.ndarray:
-    """Return (N, 3) float32 colours; `mode` is one of `MODES`, speeds, sounds [m/s], densities [kg/m^3], steps, leads [s]."""
+    """Return (N, 3) float32 colours; `mode` is one of `MODES`.
+
+    Units: speeds, sounds [m/s], densities [kg/m^3], steps, leads [s], pressures [Pa].
+    """
     choose = _choose("colour mode", mode, _MODES)
-    given = [values for values in (levels, speeds, densities, steps, leads, sounds) if values is not None]
+    given = [values for values in (levels, speeds, densities, steps, leads, sounds, pressures) if values is not None]
     if not given:
         raise RenderError(
             f"colour mode {mode!r} got no array, and needs at least one to know the number of particles: "
-            "pass levels=, speeds=, densities=, steps=, leads= or sounds="
+            "pass levels=, speeds=, densities=, steps=, leads=, sounds= or pressures="
         )
     return choose(
         levels=levels,
@@ -175,10 +191,12 @@ def colour_by(
         steps=steps,
         leads=leads,
         sounds=sounds,
+        pressures=pressures,
         rest_density=rest_density,
         max_speed=max_speed,
         longest_step=longest_step,
         top_sound=top_sound,
+        top_pressure=top_pressure,
         palette=palette,
         doubling=doubling,
         count=len(given[0]),

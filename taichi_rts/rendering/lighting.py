@@ -7,7 +7,7 @@ import numpy as np
 
 from taichi_rts.rendering.camera import Camera, box_corners
 
-HAZE = 0.12  # share of the background at the far end of the box, in linear light: more would bend the colours
+HAZE = 0.07  # share of the background at the far end of the box, in linear light: more would bend the colours
 
 
 def bounds(positions: np.ndarray, outline) -> tuple[np.ndarray, np.ndarray]:
