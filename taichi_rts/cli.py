@@ -1,4 +1,4 @@
-"""The command line: `taichi-rts run|compare|stability|scenes|info`."""
+"""The command line: `taichi-rts run|compare|stability|side-by-side|scenes|info`."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from taichi_rts.output.resume import (
     open_checkpoint,
     output_folder,
 )
+from taichi_rts.output.side_by_side import SideBySide
 from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
 from taichi_rts.rendering.painter import Mode, PictureOptions, View, make_cameras
 from taichi_rts.stability.command import Stability
@@ -292,6 +293,7 @@ Command = (
     Annotated[Run, tyro.conf.subcommand("run")]
     | Annotated[Compare, tyro.conf.subcommand("compare")]
     | Annotated[Stability, tyro.conf.subcommand("stability")]
+    | Annotated[SideBySide, tyro.conf.subcommand("side-by-side")]
     | Annotated[Scenes, tyro.conf.subcommand("scenes")]
     | Annotated[Info, tyro.conf.subcommand("info")]
 )
