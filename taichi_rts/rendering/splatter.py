@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 import taichi as ti
 
+from taichi_rts.backend import has_vulkan_hardware
 from taichi_rts.errors import RenderError
-from taichi_rts.rendering import lighting, shade_kernels, splat_kernels
+from taichi_rts.rendering import flat_kernels, lighting, shade_kernels, splat_kernels
 from taichi_rts.rendering.camera import Camera, box_corners, box_edges
 
 LINE_COLOUR = (0.16, 0.17, 0.20)
@@ -112,6 +113,7 @@ class Splatter:
         self._pattern = ti.Vector.ndarray(3, ti.f32, max(len(pattern), 1))
         if len(pattern):
             self._pattern.from_numpy(pattern)
+        self._flat = ti.cfg.arch == ti.vulkan and not has_vulkan_hardware()
         self._capacity = 0
         self._reserve(1)
 
@@ -156,10 +158,7 @@ class Splatter:
             self._splat(count, light_lens, (size, size), self._shadow_tiles, self._shadow_depth)
         if count:
             self._project(count, radius, eye, basis, lens)
-            self._splat(count, lens, self._fine, self._tiles, self._depth)
-            splat_kernels.splat_numbers(
-                self._sprites, count, lens, width, height, self._tiles, self._depth, self._nearest
-            )
+            self._splat(count, lens, self._fine, self._tiles, self._depth, self._nearest)
         if outline is not None:
             self._trace(outline, camera, lens, radius)
         extent = float(np.linalg.norm(box[1] - box[0]))
@@ -221,12 +220,27 @@ class Splatter:
     def _project(self, count: int, radius: float, eye, basis, lens) -> None:
         splat_kernels.project_points(self._points, count, radius, eye, *basis, lens, self._sprites)
 
-    def _splat(self, count: int, lens, size: tuple[int, int], tiles, depth) -> None:
-        """Enter the least depths and the tiles' farthest: few spheres first, then always more that those do not hide."""
+    def _splat(self, count: int, lens, size: tuple[int, int], tiles, depth, nearest=None) -> None:
+        """Enter the least depths, and what is nearest: few spheres first, then always more that those do not hide."""
+        if self._flat:
+            self._splat_flat(count, lens, size, depth, nearest)
+            return
         splat_kernels.clear_buffer(tiles, splat_kernels.FAR)
         for stride in splat_kernels.STRIDES:
             splat_kernels.splat_depths(self._sprites, count, stride, lens, *size, tiles, depth)
             splat_kernels.measure_tiles(depth, *size, tiles)
+        if nearest is not None:
+            splat_kernels.splat_numbers(self._sprites, count, lens, *size, tiles, depth, nearest)
+
+    def _splat_flat(self, count: int, lens, size: tuple[int, int], depth, nearest) -> None:
+        side = 2 * int(np.ceil(self._sprites.to_numpy()[:count, 3].max())) + 1
+        chunk = max(flat_kernels.MOST // side**2, 1)
+        for first in range(0, count, chunk):
+            last = min(first + chunk, count)
+            flat_kernels.splat_depths(self._sprites, first, last, side, lens, *size, depth)
+        for first in range(0, count if nearest is not None else 0, chunk):
+            last = min(first + chunk, count)
+            flat_kernels.splat_numbers(self._sprites, first, last, side, lens, *size, depth, nearest)
 
     def _trace(self, outline, camera: Camera, lens, radius: float) -> None:
         """Draw the wireframe of a box into the line buffer; its edges end at the camera's near plane."""

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 import taichi as ti
 
+from taichi_rts import backend
 from taichi_rts.errors import RenderError
 from taichi_rts.rendering import splat_kernels
 from taichi_rts.rendering.camera import Camera
@@ -202,6 +203,17 @@ def test_default_precision_of_the_run_does_not_matter(taichi_cpu, tmp_path):
     ti.init(arch=ti.cpu, default_fp=ti.f64, offline_cache_file_path=str(tmp_path), log_level=ti.ERROR)
     double = Splatter(WIDTH, HEIGHT).draw(positions, colours, 0.1, FRONT).astype(int)
     assert (np.abs(single - double).max(axis=2) > 2).mean() < 1e-3
+
+
+def test_vulkan_draws_what_the_processor_draws(start_taichi):
+    if not backend.vulkan_device_types():
+        pytest.skip("no Vulkan driver on this machine")
+    positions, colours = cloud(60)
+    box, pictures = ((-1.5,) * 3, (1.5,) * 3), []
+    for arch in ("cpu", "vulkan"):
+        with start_taichi(arch):
+            pictures.append(Splatter(WIDTH, HEIGHT).draw(positions, colours, 0.2, FRONT, box).astype(int))
+    assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 2).mean() < 1e-3
 
 
 def test_tables_are_inverse():
