@@ -1,4 +1,4 @@
-"""The command line: `taichi-rts run|compare|stability|bench|scenes|info`."""
+"""The command line: `taichi-rts run|compare|stability|bench|side-by-side|scenes|info`."""
 
 from __future__ import annotations
 
@@ -28,8 +28,9 @@ from taichi_rts.output.resume import (
     open_checkpoint,
     output_folder,
 )
+from taichi_rts.output.side_by_side import SideBySide
 from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
-from taichi_rts.rendering.painter import Mode, PictureOptions
+from taichi_rts.rendering.painter import Mode, PictureOptions, View, make_cameras
 from taichi_rts.stability.command import Stability
 from taichi_rts.stability.diagnosis import FirstDiagnoses
 from taichi_rts.stepping.steppers import STEPPERS
@@ -111,6 +112,12 @@ class Run:
     """Camera angle around the vertical [degrees]."""
     elevation: float | None = None
     """Camera angle above the ground [degrees]."""
+    quality: Literal["draft", "good", "best"] = "good"
+    """Splatter: draft has no shadows, best four times the samples of good (docs/rendering.md)."""
+    transparent: bool = False
+    """Splatter: frames with an alpha channel instead of a white background; shadows stay."""
+    views: tuple[View, ...] = ()
+    """Views side by side in each frame: any of scene, front, side and top; by default the scene's alone."""
     panels: Literal["figure3", "ablation", "steppers"] | None = None
     """Several panels in a frame: the paper's Figure 3 or 2, or one for each stepper. They have their own steppers."""
     video: bool = False
@@ -185,6 +192,8 @@ class Run:
         recording.exporter(scene.dim)  # here, so that what is wrong is said before anything starts
         frames = len(frame_times(scene.end_time, self.export_fps))
         check_size(self.width, self.height)
+        for panel in panels:
+            make_cameras(scene, dataclasses.replace(self.picture(), **panel.options))
         with Interrupts() as interrupts:
             device = rts.init(self.arch, self.precision or "f32")
             with Recorder(
@@ -296,6 +305,7 @@ Command = (
     | Annotated[Compare, tyro.conf.subcommand("compare")]
     | Annotated[Stability, tyro.conf.subcommand("stability")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
+    | Annotated[SideBySide, tyro.conf.subcommand("side-by-side")]
     | Annotated[Scenes, tyro.conf.subcommand("scenes")]
     | Annotated[Info, tyro.conf.subcommand("info")]
 )

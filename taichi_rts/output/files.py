@@ -10,8 +10,12 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import imageio.v3 as imageio
+import numpy as np
+
 from taichi_rts.errors import OutputError
 
+PNG_COMPRESSION = 3  # of 9: 40 instead of 120 ms a frame for 10 % more bytes
 ARTEFACTS = (
     "frames",
     "run.json",
@@ -55,6 +59,11 @@ def replacing(path: Path, temporary: Path | None = None) -> Iterator[BinaryIO]:
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink()
+
+
+def write_png(path: Path, image: np.ndarray) -> None:
+    """Write a picture, (H, W, 3 or 4) uint8, in one go."""
+    write_bytes(path, imageio.imwrite("<bytes>", image, extension=".png", compress_level=PNG_COMPRESSION))
 
 
 def write_json(path: Path, data: Any) -> None:

@@ -21,7 +21,7 @@ from taichi_rts.errors import CheckpointError, Interrupted, OutputError
 from taichi_rts.frames import frame_times
 from taichi_rts.output.checkpoint import Checkpoint, write
 from taichi_rts.output.export import DEFAULT_ATTRIBUTES, Exporter
-from taichi_rts.output.files import prepare_folder, write_bytes, write_json
+from taichi_rts.output.files import prepare_folder, write_json, write_png
 from taichi_rts.output.lock import FolderLock
 from taichi_rts.output.resume import checkpoint_name, newest, output_folder
 from taichi_rts.output.series import Series
@@ -32,8 +32,6 @@ from taichi_rts.rendering.painter import Painter, PictureOptions, make_renderer
 from taichi_rts.scene import Scene
 from taichi_rts.simulation import Simulation
 from taichi_rts.stepping.steppers import stepper_data
-
-PNG_COMPRESSION = 3  # of 9: 40 instead of 120 ms a frame for 10 % more bytes
 
 
 @dataclasses.dataclass(frozen=True)
@@ -220,8 +218,7 @@ class Recorder:
         for series in self.series:
             series()
         if image is not None:
-            data = imageio.imwrite("<bytes>", image, extension=".png", compress_level=PNG_COMPRESSION)
-            write_bytes(self.frame_path(number), data)
+            write_png(self.frame_path(number), image)
             for film in films:
                 film.append(image)
         self.frames_done = number + 1

@@ -27,8 +27,16 @@ def require_video() -> None:
         raise OutputError("--video needs the package imageio-ffmpeg; run: pip install 'taichi_rts[video]'")
 
 
+def opaque(image: np.ndarray) -> np.ndarray:
+    """Return a frame, (H, W, 3 or 4) uint8, without its alpha channel, laid over white: films have none."""
+    if image.shape[2] == 3:
+        return image
+    alpha = image[..., 3:].astype(np.float32) / 255
+    return np.rint(image[..., :3] * alpha + 255 * (1 - alpha)).astype(np.uint8)
+
+
 class Video:
-    """Collects frames, (H, W, 3) uint8, in a temporary file that `close` renames to `path`."""
+    """Collects frames, (H, W, 3 or 4) uint8, in a temporary file that `close` renames to `path`."""
 
     def __init__(self, path: Path, fps: float) -> None:
         require_video()
@@ -40,7 +48,7 @@ class Video:
     def append(self, image: np.ndarray) -> None:
         """Add one frame; odd sides are cropped by a pixel, as the codec needs even ones."""
         try:
-            self.writer.append_data(image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2])
+            self.writer.append_data(opaque(image)[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2])
         except (OSError, ValueError) as error:
             reason = str(error).splitlines()[0]
             raise OutputError(
@@ -76,7 +84,7 @@ class Gif:
     def append(self, image: np.ndarray) -> None:
         """Add one frame, if it is its turn."""
         if self.seen % self.every == 0:
-            picture = Image.fromarray(image)
+            picture = Image.fromarray(opaque(image))
             if picture.width > GIF_WIDTH:
                 picture = picture.resize((GIF_WIDTH, round(picture.height * GIF_WIDTH / picture.width)))
             self.frames.append(picture.quantize(GIF_COLOURS, dither=Image.Dither.NONE))

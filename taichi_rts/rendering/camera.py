@@ -66,8 +66,10 @@ class Camera:
         aspect: float = 16 / 9,
         up=(0.0, 1.0, 0.0),
         field_of_view: float = 35.0,
+        *,
+        perspective: bool = True,
     ) -> "Camera":
-        """Return a camera that sees the whole box; a 2D box is seen from the front without perspective.
+        """Return a camera that sees the whole box; a 2D box is seen from the front, and never in perspective.
 
         `azimuth` and `elevation` [degrees] turn the eye around `up` and above the ground; at azimuth 0
         the x axis runs to the right of the picture.
@@ -83,6 +85,11 @@ class Camera:
         az, el = np.radians(azimuth), np.radians(elevation)
         outward = np.cos(el) * (np.sin(az) * across + np.cos(az) * front) + np.sin(el) * upward
         camera = cls(tuple(centre + outward), tuple(centre), tuple(up), field_of_view)
+        if not perspective:
+            right, above, _ = camera.basis()
+            height = float(max(np.ptp(corners @ above), np.ptp(corners @ right) / aspect)) / MARGIN
+            eye = centre + float(np.linalg.norm(extent)) * outward
+            return replace(camera, eye=tuple(eye), orthographic_height=height)
         half_height = np.tan(np.radians(field_of_view) / 2) * MARGIN
         for _ in range(6):  # perspective makes the near side larger: move the box to the middle of the picture
             camera, distance = _back_off(camera, corners, outward, half_height, aspect)

@@ -112,6 +112,11 @@ def _by_fluid(fluids, fluid_tints, **_):
     return _needed("fluid", "fluid_tints", fluid_tints)[_needed("fluid", "fluids", fluids)]
 
 
+def _by_pressure(pressures, top_pressure, **_):
+    pressures = _needed("pressure", "pressures", pressures)
+    return scalar_colours(pressures, *pressure_range(pressures, top_pressure))
+
+
 def _plain(count, **_):
     return np.tile(np.asarray(PLAIN, np.float32), (count, 1))
 
@@ -124,6 +129,7 @@ _MODES = {
     "density": _by_density,
     "sound": _by_sound,
     "fluid": _by_fluid,
+    "pressure": _by_pressure,
     "plain": _plain,
 }
 MODES = tuple(_MODES)
@@ -137,6 +143,11 @@ def speed_range(speeds, max_speed: float | None) -> tuple[float, float]:
 def sound_range(sounds, top_sound: float | None) -> tuple[float, float]:
     """Return the range that mode "sound" shows [m/s]."""
     return 0.0, _upper(sounds, top_sound)
+
+
+def pressure_range(pressures, top_pressure: float | None) -> tuple[float, float]:
+    """Return the range that mode "pressure" shows [Pa]."""
+    return 0.0, _upper(pressures, top_pressure)
 
 
 def step_range(steps, longest_step: float | None) -> tuple[float, float]:
@@ -168,23 +179,27 @@ def colour_by(
     sounds=None,
     fluids=None,
     fluid_tints=None,
+    pressures=None,
     rest_density: float = 1000.0,
     max_speed: float | None = None,
     longest_step: float | None = None,
     top_sound: float | None = None,
+    top_pressure: float | None = None,
     palette: str = "default",
     doubling: bool = False,
 ) -> np.ndarray:
-    """Return (N, 3) float32 colours; `mode` is one of `MODES`, speeds, sounds [m/s], densities [kg/m^3], steps, leads [s].
+    """Return (N, 3) float32 colours; `mode` is one of `MODES`.
 
-    `fluids` are the places, (N,), of particles' colours in `fluid_tints`, (K, 3).
+    Units: speeds, sounds [m/s], densities [kg/m^3], steps, leads [s], pressures [Pa]. `fluids` are the places, (N,), of
+    particles' colours in `fluid_tints`, (K, 3).
     """
     choose = _choose("colour mode", mode, _MODES)
-    given = [values for values in (levels, speeds, densities, steps, leads, sounds, fluids) if values is not None]
+    arrays = (levels, speeds, densities, steps, leads, sounds, fluids, pressures)
+    given = [values for values in arrays if values is not None]
     if not given:
         raise RenderError(
             f"colour mode {mode!r} got no array, and needs at least one to know the number of particles: "
-            "pass levels=, speeds=, densities=, steps=, leads=, sounds= or fluids="
+            "pass levels=, speeds=, densities=, steps=, leads=, sounds=, fluids= or pressures="
         )
     return choose(
         levels=levels,
@@ -195,10 +210,12 @@ def colour_by(
         sounds=sounds,
         fluids=fluids,
         fluid_tints=fluid_tints,
+        pressures=pressures,
         rest_density=rest_density,
         max_speed=max_speed,
         longest_step=longest_step,
         top_sound=top_sound,
+        top_pressure=top_pressure,
         palette=palette,
         doubling=doubling,
         count=len(given[0]),

@@ -15,6 +15,11 @@ def _bytes(colour) -> tuple[int, int, int]:
     return red, green, blue
 
 
+def _size_in(image: np.ndarray) -> int:
+    """Return the text size [pixels] that suits a picture: as high as its height asks for, less in one that is narrow."""
+    return font_size(min(image.shape[0], 2 * image.shape[1]))
+
+
 def _place(image: np.ndarray, width: float, height: float, position: str) -> tuple[int, int]:
     """Return the upper left corner of a panel of a given size."""
     margin = round(0.02 * image.shape[0])
@@ -37,7 +42,7 @@ def draw_legend(image: np.ndarray, title: str, entries, lines=(), position: str 
     `entries` are (label, (r, g, b) in 0 to 1, share in 0 to 1 or None); text is as large as the
     picture's height asks for.
     """
-    size = font_size(image.shape[0])
+    size = _size_in(image)
     step, pad, chip = round(1.5 * size), round(0.75 * size), size
     label = max((text_width(name, size) for name, _, _ in entries), default=0.0)
     shares = any(share is not None for _, _, share in entries)
@@ -83,7 +88,7 @@ def draw_colour_bar(
     position: str = "top-right",
 ) -> np.ndarray:
     """Return a copy of the picture with a colour bar; `colours` (K, 3) run from `lower` to `upper`."""
-    size = font_size(image.shape[0])
+    size = _size_in(image)
     pad, length = round(0.75 * size), round(14 * size)
     heading = f"{title} [{unit}]" if unit else title
     width = round(max(length, text_width(heading, size)) + 2 * pad)
@@ -110,11 +115,17 @@ def _captioned(image: np.ndarray, caption: str) -> np.ndarray:
     """Return the picture with a white strip above it that holds the caption, centred."""
     if not caption:
         return image
-    size = font_size(image.shape[0])
-    strip = Image.new("RGB", (image.shape[1], round(2 * size)), (255, 255, 255))
+    size = _size_in(image)
+    mode = Image.fromarray(image).mode
+    strip = Image.new(mode, (image.shape[1], round(2 * size)), (255,) * len(mode))
     start = 0.5 * (image.shape[1] - text_width(caption, size))
     draw_text(ImageDraw.Draw(strip), (max(start, 0), 0.5 * size), caption, size, INK)
     return np.concatenate([np.asarray(strip), image])
+
+
+def rule_thickness(height: int) -> int:
+    """Return the thickness [pixels] of the line between two pictures of a height [pixels]."""
+    return max(height // 180, 2)
 
 
 def _panels(images, captions, axis: int) -> np.ndarray:
@@ -133,10 +144,11 @@ def _panels(images, captions, axis: int) -> np.ndarray:
     if any(captions):  # an empty caption among others keeps its strip, or the panels would not line up
         captions = [caption or " " for caption in captions]
     panels = [_captioned(image, caption) for image, caption in zip(images, captions, strict=True)]
-    thickness = max(images[0].shape[0] // 180, 2)
+    thickness = rule_thickness(images[0].shape[0])
     shape = list(panels[0].shape)
     shape[axis] = thickness
     rule = np.full(shape, 205, np.uint8)
+    rule[..., 3:] = 255
     pieces = [piece for panel in panels for piece in (rule, panel)][1:]
     return np.concatenate(pieces, axis=axis)
 

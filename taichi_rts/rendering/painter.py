@@ -8,6 +8,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from taichi_rts.errors import RenderError
 from taichi_rts.rendering import colours, legend
 from taichi_rts.rendering.camera import Camera
 from taichi_rts.rendering.obstacles import ObstaclePoints
@@ -15,14 +16,22 @@ from taichi_rts.rendering.splatter import Splatter
 from taichi_rts.scene import Scene
 from taichi_rts.simulation import Simulation
 
-Mode = Literal["level", "step", "lead", "speed", "density", "sound", "fluid", "plain"]
+Mode = Literal["level", "step", "lead", "speed", "density", "sound", "fluid", "pressure", "plain"]
+View = Literal["scene", "front", "side", "top"]
+VIEWS: dict[str, tuple[float, float]] = {"front": (0.0, 0.0), "side": (90.0, 0.0), "top": (0.0, 89.99)}
+"""Azimuth and elevation [degrees] of the views without perspective; straight down, there would be no right."""
+MOST_VIEWS = 4
 BAR_STEPS = 64
 LEGEND_ROWS = 8  # with more levels than that the legend leaves out those that nobody has
 
 
 @dataclass(frozen=True)
 class PictureOptions:
-    """How pictures look; None for `azimuth` and `elevation` [degrees] takes the scene's own view."""
+    """How pictures look; None for `azimuth` and `elevation` [degrees] takes the scene's own view.
+
+    Several `views` stand side by side in a picture of `width` x `height` pixels; "scene", in perspective, is what no views
+    give. Raises `RenderError` for more than four, and for what the renderer cannot do.
+    """
 
     width: int = 1280
     height: int = 720
@@ -32,6 +41,23 @@ class PictureOptions:
     azimuth: float | None = None
     elevation: float | None = None
     legend: bool = True
+    quality: Literal["draft", "good", "best"] = "good"
+    transparent: bool = False
+    views: tuple[View, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.renderer == "ggui" and (self.transparent or self.quality != "good"):
+            raise RenderError(
+                "--transparent and --quality are the splatter's; leave them out, or give --renderer splatter"
+            )
+        if len(self.views) > MOST_VIEWS:
+            raise RenderError(f"{len(self.views)} views in one picture; at most {MOST_VIEWS} can be told apart")
+
+    @property
+    def view_size(self) -> tuple[int, int]:
+        """Width and height [pixels] of one view."""
+        count = max(len(self.views), 1)
+        return (self.width - (count - 1) * legend.rule_thickness(self.height)) // count, self.height
 
 
 def make_renderer(options: PictureOptions) -> Any:
@@ -39,12 +65,30 @@ def make_renderer(options: PictureOptions) -> Any:
     if options.renderer == "ggui":
         from taichi_rts.rendering.ggui import GguiRenderer  # only here, because it needs Vulkan
 
-        return GguiRenderer(options.width, options.height)
-    return Splatter(options.width, options.height)
+        return GguiRenderer(*options.view_size)
+    return Splatter(*options.view_size, quality=options.quality, transparent=options.transparent)
 
 
-def make_camera(scene: Scene, options: PictureOptions) -> Camera:
-    """Return the camera: the scene's view with the options' angles, framing the domain."""
+def make_cameras(scene: Scene, options: PictureOptions) -> list[Camera]:
+    """Return the camera of each view; raises `RenderError` for views that the scene does not have, or angles besides."""
+    if options.views and scene.dim == 2:
+        raise RenderError(
+            f"--views {' '.join(options.views)}: a scene in two dimensions has one view only; leave it out"
+        )
+    if options.views and "scene" not in options.views and (options.azimuth, options.elevation) != (None, None):
+        raise RenderError(
+            f"--views {' '.join(options.views)} have angles of their own; leave out --azimuth and --elevation"
+        )
+    return [make_camera(scene, options, view) for view in options.views or ("scene",)]
+
+
+def make_camera(scene: Scene, options: PictureOptions, name: View = "scene") -> Camera:
+    """Return the camera of a view that frames the domain; "scene" is the scene's own, with the options' angles."""
+    width, height = options.view_size
+    if name in VIEWS:
+        azimuth, elevation = VIEWS[name]
+        box = scene.domain.lower, scene.domain.upper
+        return Camera.framing(*box, azimuth, elevation, width / height, perspective=False)
     view = scene.view
     if view.eye is not None and view.target is not None and options.azimuth is None and options.elevation is None:
         return Camera(view.eye, view.target)
@@ -53,7 +97,7 @@ def make_camera(scene: Scene, options: PictureOptions) -> Camera:
         scene.domain.upper,
         azimuth=view.azimuth if options.azimuth is None else options.azimuth,
         elevation=view.elevation if options.elevation is None else options.elevation,
-        aspect=options.width / options.height,
+        aspect=width / height,
     )
     return camera.zoomed(1.0 / view.zoom) if view.zoom != 1.0 else camera
 
@@ -66,18 +110,27 @@ class Painter:
         self.options = options
         self.title = title
         self.renderer = renderer if renderer is not None else make_renderer(options)
-        self.camera = make_camera(scene, options)
+        self.cameras = make_cameras(scene, options)
         self.obstacles = ObstaclePoints(scene, 0.5 * scene.spacing)
         self.top_speed = scene.estimate_max_speed()
+        self.top_pressure = 0.5 * scene.rest_density * self.top_speed**2
 
     def paint(self, sim: Simulation) -> np.ndarray:
-        """Return the picture of `sim` at its present time, (height, width, 3) uint8."""
+        """Return the picture of `sim` at its present time, (height, width, 3) uint8, or 4 if it is transparent."""
         x, v, rho, level = sim.state()
         tints = self.colours(sim, v, rho, level)
         outline = (self.scene.domain.lower, self.scene.domain.upper)
         x, tints = self.obstacles.add(x, tints, sim.time)
-        image = self.renderer.draw(x, tints, 0.5 * self.scene.spacing, self.camera, outline)
+        images = [self.renderer.draw(x, tints, 0.5 * self.scene.spacing, each, outline) for each in self.cameras]
+        image = self._joined(images) if len(images) > 1 else images[0]
         return self._label(image, sim, level) if self.options.legend else image
+
+    def _joined(self, images: list[np.ndarray]) -> np.ndarray:
+        """Return all views in one picture, each with its name."""
+        if self.options.legend:
+            named = zip(images, self.options.views, strict=True)
+            images = [legend.draw_legend(image, name, [], position="bottom-left") for image, name in named]
+        return legend.hstack_panels(images)
 
     def colours(self, sim: Simulation, v: np.ndarray, rho: np.ndarray, level: np.ndarray) -> np.ndarray:
         """Colours (N, 3) of the particles of `sim`, whose velocities `v`, densities `rho` and levels these are."""
@@ -92,10 +145,12 @@ class Painter:
             sounds=sim.sound_speeds() if mode == "sound" else None,
             fluids=sim.fluids() if mode == "fluid" else None,
             fluid_tints=self._fluid_tints() if mode == "fluid" else None,
+            pressures=sim.medium.equation_of_state.pressure_numpy(rho) if mode == "pressure" else None,
             rest_density=self.scene.rest_density,
             max_speed=self.top_speed,
             longest_step=longest_lead(sim) if mode == "lead" else longest_step(sim),
             top_sound=self.scene.viscous_wave_speed,
+            top_pressure=self.top_pressure,
             palette=self.options.palette,
             doubling=sim.schedule.levels_double,
         )
@@ -153,6 +208,12 @@ class Painter:
         tints = colours.colour_by("sound", sounds=values, top_sound=upper)
         return legend.draw_colour_bar(image, "sound speed", lower, upper, "m/s", tints)
 
+    def _pressure_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
+        lower, upper = colours.pressure_range([], self.top_pressure)
+        values = np.linspace(lower, upper, BAR_STEPS)
+        tints = colours.colour_by("pressure", pressures=values, top_pressure=upper)
+        return legend.draw_colour_bar(image, "pressure", 1e-3 * lower, 1e-3 * upper, "kPa", tints)
+
     def _density_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
         lower, upper = colours.density_range(self.scene.rest_density)
         values = np.linspace(lower, upper, BAR_STEPS)
@@ -166,6 +227,7 @@ _BARS = {
     "speed": Painter._speed_bar,
     "density": Painter._density_bar,
     "sound": Painter._sound_bar,
+    "pressure": Painter._pressure_bar,
 }
 
 

@@ -18,23 +18,21 @@ from taichi_rts.rendering.splat_kernels import (
     vec4,
 )
 
-AO_PAIRS = 8
-SHADOW_TAPS = 8
-TAPS = AO_PAIRS + SHADOW_TAPS
 TURNS = 16  # sampling patterns, one for each pixel of a 4 x 4 tile
 GOLDEN = np.pi * (3 - np.sqrt(5))
 NOTHING = 1e30  # depth of a pixel that shows neither fluid nor ground
 
 
-def sampling_pattern() -> np.ndarray:
-    """Return (TURNS * TAPS, 3): direction and distance in units of the reach, on a golden-angle spiral."""
+def sampling_pattern(pairs: int, taps: int) -> np.ndarray:
+    """Return (TURNS * (pairs + taps), 3): direction and distance in units of the reach, on a golden-angle spiral.
+
+    In each turn `pairs` are for occlusion, sampled densely close by, and `taps` for light, evenly over a disc.
+    """
     turn = np.arange(TURNS)[:, None] / TURNS
-    pair, tap = np.arange(AO_PAIRS), np.arange(SHADOW_TAPS)
+    pair, tap = np.arange(pairs), np.arange(taps)
     angle = np.concatenate([GOLDEN * pair + np.pi * turn, GOLDEN * tap + 2 * np.pi * turn], axis=1)
-    share = (np.concatenate([pair, tap]) + 0.5) / np.repeat([AO_PAIRS, SHADOW_TAPS], [AO_PAIRS, SHADOW_TAPS])
-    # occlusion is sampled densely close by, light evenly over a disc
-    near = ((pair + turn + 0.5) / AO_PAIRS) ** 2
-    even = np.broadcast_to(np.sqrt(share[AO_PAIRS:]), (TURNS, SHADOW_TAPS))
+    near = ((pair + turn + 0.5) / max(pairs, 1)) ** 2
+    even = np.broadcast_to(np.sqrt((tap + 0.5) / max(taps, 1)), (TURNS, taps))
     distance = np.concatenate([near, even], axis=1)
     return np.stack([np.cos(angle), np.sin(angle), distance], axis=-1).reshape(-1, 3).astype(np.float32)
 
@@ -65,7 +63,7 @@ def ground_depth(x, y, lens, ground, ground_reach):
 
 
 @ti.func
-def open_sky(x, y, z, turn, reach, lens, width, height, pattern: ti.template(), depth: ti.template()):
+def open_sky(x, y, z, first, pairs, reach, lens, width, height, pattern: ti.template(), depth: ti.template()):
     """Share of the sky that the depths around a pixel leave open.
 
     Opposite samples are taken in pairs and their slopes added, so that a plane, however tilted, hides
@@ -74,8 +72,8 @@ def open_sky(x, y, z, turn, reach, lens, width, height, pattern: ti.template(), 
     unit = metres_per_pixel(z, lens)
     widen = reach / unit
     blocked = ti.f32(0.0)
-    for k in range(AO_PAIRS):
-        arm = pattern[turn * TAPS + k]
+    for k in range(pairs):
+        arm = pattern[first + k]
         span = ti.max(arm[2] * widen, ti.f32(2.0))  # [pixels]
         dx = arm[0] * span
         dy = arm[1] * span
@@ -91,7 +89,7 @@ def open_sky(x, y, z, turn, reach, lens, width, height, pattern: ti.template(), 
                 rise = ti.select(rise > ti.f32(4.0) * reach, ti.f32(0.0), rise)  # something far in front
             slope += ti.min(ti.max(rise / distance, ti.f32(-1.0)), ti.f32(2.0))
         blocked += ti.min(ti.max(slope * ti.f32(0.5), ti.f32(0.0)), ti.f32(1.0))
-    return ti.f32(1.0) - blocked / ti.cast(AO_PAIRS, ti.f32)
+    return ti.f32(1.0) - blocked / ti.cast(ti.max(pairs, 1), ti.f32)
 
 
 @ti.kernel
@@ -113,10 +111,14 @@ def measure_veil(
     width: ti.i32,
     height: ti.i32,
     supersample: ti.i32,
+    pairs: ti.i32,
+    taps: ti.i32,
     pattern: Vectors3,
     veil: Vectors3,
 ):
     """Find depth, openness and light of each final pixel, with a pattern that turns from pixel to pixel.
+
+    The pattern has `pairs` of samples for openness and `taps` for light; with none of them all is open, or lit.
 
     The light's frame is given in view coordinates (right, up, forward, from the eye).
     """
@@ -135,15 +137,16 @@ def measure_veil(
         if z < ti.f32(NOTHING):
             # 16 turns in a 4 x 4 tile, neighbours far apart; the blur over 4 x 4 pixels then sees each once
             turn = ((row & 3) * 4 + (column & 3)) * 7 % TURNS
-            openness = open_sky(x, y, z, turn, reach, lens, width, height, pattern, depth)
+            first = turn * (pairs + taps)
+            openness = open_sky(x, y, z, first, pairs, reach, lens, width, height, pattern, depth)
             side, above = view_offset(x, y, z, lens)
             spot = vec3(side, above, z) - light_origin
             u = light_lens[2] + light_lens[0] * spot.dot(light_right)
             v = light_lens[3] - light_lens[0] * spot.dot(light_up)
             limit = spot.dot(light_forward) - ti.select(on_ground, ti.f32(0.0), bias)
             lit = ti.f32(0.0)
-            for k in range(SHADOW_TAPS):
-                arm = pattern[turn * TAPS + AO_PAIRS + k]
+            for k in range(taps):
+                arm = pattern[first + pairs + k]
                 i = ti.floor(u + softness * arm[2] * arm[0], ti.i32)
                 j = ti.floor(v + softness * arm[2] * arm[1], ti.i32)
                 clear = ti.f32(1.0)
@@ -151,7 +154,9 @@ def measure_veil(
                     if ti.bit_cast(shadows[j * shadow_size + i], ti.f32) < limit:
                         clear = ti.f32(0.0)
                 lit += clear
-            result = vec3(z, openness, lit / ti.cast(SHADOW_TAPS, ti.f32))
+            result = vec3(z, openness, 1)
+            if taps > 0:
+                result[2] = lit / ti.cast(taps, ti.f32)
         veil[p] = result
 
 
@@ -199,6 +204,15 @@ def veil_at(row, column, z, tolerance, columns, rows, veil: ti.template()):
     return best
 
 
+@ti.func
+def on_floor(side, above, z, floor_corner, floor_across, floor_along):
+    """Whether a point in view coordinates is above the floor, a parallelogram with sides given as a / |a|^2."""
+    spot = vec3(side, above, z) - floor_corner
+    u = spot.dot(floor_across)
+    v = spot.dot(floor_along)
+    return ti.min(u, v) > 0 and ti.max(u, v) < 1
+
+
 @ti.kernel
 def shade_picture(
     sprites: Vectors4,
@@ -212,7 +226,15 @@ def shade_picture(
     light: vec3,
     sky: vec3,
     background: vec3,
+    opaque: ti.i32,
+    ground: vec4,
+    ground_reach: ti.f32,
     ground_shade: ti.f32,
+    floor_shade: ti.f32,
+    floor_corner: vec3,
+    floor_across: vec3,
+    floor_along: vec3,
+    haze: vec3,
     line_colour: vec3,
     radius: ti.f32,
     width: ti.i32,
@@ -220,7 +242,11 @@ def shade_picture(
     supersample: ti.i32,
     picture: Ints,
 ):
-    """Light every supersample, average and pack sRGB bytes; directions are in view coordinates."""
+    """Light every supersample, average and pack sRGB bytes; directions are in view coordinates.
+
+    `haze` is (depth where it begins, 1 / depth that it takes, share of the background at its end). Ground is black of some
+    opacity over the background, so that without `opaque` shadows fall on whatever the picture is laid over.
+    """
     columns = width // supersample
     rows = height // supersample
     tolerance = ti.f32(4.0) * radius
@@ -230,14 +256,28 @@ def shade_picture(
     for p in range(picture.shape[0]):
         row = p // columns
         column = p - row * columns
+        below = ti.f32(0.0)  # opacity of the ground
+        if ground_shade > 0:
+            air = veil[p]
+            below = one - (one - ground_shade * (one - air[2])) * (one - ground_shade * (one - air[1]))
+            x = (ti.cast(column, ti.f32) + ti.f32(0.5)) * ti.cast(supersample, ti.f32)
+            y = (ti.cast(row, ti.f32) + ti.f32(0.5)) * ti.cast(supersample, ti.f32)
+            z = ground_depth(x, y, lens, ground, ground_reach)
+            if z < ti.f32(NOTHING):
+                side, above = view_offset(x, y, z, lens)
+                if on_floor(side, above, z, floor_corner, floor_across, floor_along):
+                    below = one - (one - below) * (one - floor_shade)
         total = vec3(0, 0, 0)
+        cover = ti.f32(0.0)
         for sub_row, sub_column in ti.ndrange(supersample, supersample):
             v = row * supersample + sub_row
             u = column * supersample + sub_column
             s = v * width + u
             number = nearest[s]
-            colour = background
+            colour = vec3(0, 0, 0)
+            thick = below
             if number != NOBODY:
+                thick = one
                 sprite = sprites[number]
                 x = (ti.cast(u, ti.f32) + ti.f32(0.5) - sprite[0]) / sprite[3]
                 y = (sprite[1] - ti.cast(v, ti.f32) - ti.f32(0.5)) / sprite[3]
@@ -262,15 +302,20 @@ def shade_picture(
                 glow = ti.f32(0.50) * above * air[1] + ti.f32(0.95) * direct * (ti.f32(0.5) + ti.f32(0.5) * air[1])
                 colour = tint * glow * (one - ti.f32(0.35) * behind)
                 colour += ti.f32(0.10) * shine * air[2] * air[1]
-            else:
-                air = veil[p]
-                if ground_shade > 0:
-                    dim = (one - ground_shade * (one - air[2])) * (one - ground_shade * (one - air[1]))
-                    colour = background * dim
+                far = ti.min(ti.max((z - haze[0]) * haze[1], ti.f32(0.0)), one)
+                colour += haze[2] * far * far * (background - colour)
             ink = ti.cast(lines[s], ti.f32) / ti.f32(255.0)
             total += colour * (one - ink) + line_colour * ink
-        total /= ti.cast(supersample * supersample, ti.f32)
-        code = 0
+            cover += thick + ink * (one - thick)
+        samples = ti.cast(supersample * supersample, ti.f32)
+        total /= samples
+        cover /= samples
+        if opaque == 1:
+            total += background * (one - cover)
+            cover = one
+        else:
+            total /= ti.max(cover, ti.f32(1e-6))
+        code = ti.round(cover * ti.f32(255.0), ti.i32) << 24
         for k in ti.static(range(3)):
             place = ti.sqrt(ti.min(ti.max(total[k], ti.f32(0.0)), one)) * ti.cast(top, ti.f32)
             code |= encode[ti.round(place, ti.i32)] << (8 * k)

@@ -20,8 +20,10 @@ Table: Any = ti.types.ndarray(dtype=ti.f32, ndim=2)
 
 FAR = 0x7F000000  # bit pattern of a depth no particle has (1.7e38 m)
 NOBODY = 0x7FFFFFFF
-SAME_DEPTH = 2  # units in the last place: two kernels may round the same formula differently
+SLACK = 1e-3  # radii by which two kernels' depths may differ: near a silhouette, Vulkan rounds the same root that differently
 SMALLEST = 0.71  # [pixels] radius below which a sphere could fall between pixel centres and vanish
+TILE = 8  # [pixels] side of the tiles that hidden spheres are found by
+STRIDES = (16, 4, 2, 1)  # one of so many spheres is drawn at first, which hides most of the others
 
 
 @ti.kernel
@@ -76,48 +78,109 @@ def clear_buffer(buffer: Ints, value: ti.i32):
 
 
 @ti.func
+def enter(sprite, number, x, y, unit, width, depth: ti.template(), nearest: ti.template(), naming: ti.template()):
+    """Enter the depth of one sphere in one of its pixels, or its number where it is the nearest."""
+    dx = ti.cast(x, ti.f32) + ti.f32(0.5) - sprite[0]
+    dy = ti.cast(y, ti.f32) + ti.f32(0.5) - sprite[1]
+    z = sprite[2] - unit * ti.sqrt(ti.max(sprite[3] * sprite[3] - dy * dy - dx * dx, ti.f32(0.0)))
+    p = y * width + x
+    if ti.static(naming):
+        if z - ti.f32(SLACK) * sprite[3] * unit <= ti.bit_cast(depth[p], ti.f32):
+            ti.atomic_min(nearest[p], number)
+    else:
+        bits = ti.bit_cast(z, ti.i32)  # floats above zero order like integers
+        if bits < depth[p]:  # a plain read first spares most of the atomics
+            ti.atomic_min(depth[p], bits)
+
+
+@ti.func
+def first_pixel(middle, reach):
+    """First pixel of a row or column whose centre is within `reach` of the middle."""
+    return ti.ceil(ti.max(middle - reach - ti.f32(0.5), ti.f32(0.0)), ti.i32)
+
+
+@ti.func
 def splat(sprite, number, lens, width, height, depth: ti.template(), nearest: ti.template(), naming: ti.template()):
-    """Visit the pixels of one sphere and enter its depth, or its number where it is the nearest."""
+    """Visit the pixels of one sphere."""
     half = ti.f32(0.5)
-    zero = ti.f32(0.0)
     size = sprite[3]
     unit = metres_per_pixel(sprite[2], lens)
-    top = ti.ceil(ti.max(sprite[1] - size - half, zero), ti.i32)
     bottom = ti.floor(ti.min(sprite[1] + size + half, ti.cast(height, ti.f32)), ti.i32)
-    for y in range(top, bottom):
+    for y in range(first_pixel(sprite[1], size), bottom):
         dy = ti.cast(y, ti.f32) + half - sprite[1]
-        chord = ti.max(size * size - dy * dy, zero)
-        reach = ti.sqrt(chord)
-        first = ti.ceil(ti.max(sprite[0] - reach - half, zero), ti.i32)
+        reach = ti.sqrt(ti.max(size * size - dy * dy, ti.f32(0.0)))
         last = ti.floor(ti.min(sprite[0] + reach + half, ti.cast(width, ti.f32)), ti.i32)
-        for x in range(first, last):
-            dx = ti.cast(x, ti.f32) + half - sprite[0]
-            z = sprite[2] - unit * ti.sqrt(ti.max(chord - dx * dx, zero))
-            bits = ti.bit_cast(z, ti.i32)  # floats above zero order like integers
-            p = y * width + x
-            if ti.static(naming):
-                if bits <= depth[p] + SAME_DEPTH:
-                    ti.atomic_min(nearest[p], number)
-            else:
-                if bits < depth[p]:  # a plain read first spares most of the atomics
-                    ti.atomic_min(depth[p], bits)
+        for x in range(first_pixel(sprite[0], reach), last):
+            enter(sprite, number, x, y, unit, width, depth, nearest, naming)
+
+
+@ti.func
+def may_be_seen(sprite, lens, width, height, tiles: ti.template()):
+    """Whether a sphere's nearest point is in front of the farthest depth of a tile that it touches."""
+    seen = False
+    if sprite[3] > 0:
+        size = sprite[3] * metres_per_pixel(sprite[2], lens)
+        front = ti.bit_cast(sprite[2] - ti.f32(1 + SLACK) * size, ti.i32)
+        columns = (width + TILE - 1) // TILE
+        left = ti.max(ti.cast(sprite[0] - sprite[3], ti.i32), 0) // TILE
+        right = ti.min(ti.cast(sprite[0] + sprite[3], ti.i32), width - 1) // TILE
+        top = ti.max(ti.cast(sprite[1] - sprite[3], ti.i32), 0) // TILE
+        bottom = ti.min(ti.cast(sprite[1] + sprite[3], ti.i32), height - 1) // TILE
+        for row in range(top, bottom + 1):
+            for column in range(left, right + 1):
+                if front <= tiles[row * columns + column]:
+                    seen = True
+    return seen
 
 
 @ti.kernel
-def splat_depths(sprites: Vectors4, count: ti.i32, lens: vec4, width: ti.i32, height: ti.i32, depth: Ints):
-    """Enter the least depth of all spheres in every pixel."""
-    for i in range(count):
-        if sprites[i][3] > 0:
-            splat(sprites[i], i, lens, width, height, depth, depth, False)
+def measure_tiles(depth: Ints, width: ti.i32, height: ti.i32, tiles: Ints):
+    """Enter the farthest depth of every tile of TILE x TILE pixels."""
+    columns = (width + TILE - 1) // TILE
+    for t in range(tiles.shape[0]):
+        row = t // columns * TILE
+        column = t % columns * TILE
+        farthest = 0
+        for y in range(row, ti.min(row + TILE, height)):
+            for x in range(column, ti.min(column + TILE, width)):
+                farthest = ti.max(farthest, depth[y * width + x])
+        tiles[t] = farthest
+
+
+@ti.kernel
+def splat_depths(
+    sprites: Vectors4,
+    count: ti.i32,
+    stride: ti.i32,
+    lens: vec4,
+    width: ti.i32,
+    height: ti.i32,
+    tiles: Ints,
+    depth: Ints,
+):
+    """Enter the least depth of all spheres, or of one in each `stride` of them, in every pixel."""
+    for k in range((count + stride - 1) // stride):
+        # which one is scattered, since every n-th of a lattice could be one plane of it
+        i = k * stride + ((k * 747796405 >> 8) & 0xFFFF) % stride
+        if i < count:
+            if may_be_seen(sprites[i], lens, width, height, tiles):
+                splat(sprites[i], i, lens, width, height, depth, depth, False)
 
 
 @ti.kernel
 def splat_numbers(
-    sprites: Vectors4, count: ti.i32, lens: vec4, width: ti.i32, height: ti.i32, depth: Ints, nearest: Ints
+    sprites: Vectors4,
+    count: ti.i32,
+    lens: vec4,
+    width: ti.i32,
+    height: ti.i32,
+    tiles: Ints,
+    depth: Ints,
+    nearest: Ints,
 ):
     """Enter the number of the nearest sphere in every pixel; of several at one depth, the lowest number."""
     for i in range(count):
-        if sprites[i][3] > 0:
+        if may_be_seen(sprites[i], lens, width, height, tiles):
             splat(sprites[i], i, lens, width, height, depth, nearest, True)
 
 
@@ -137,7 +200,9 @@ def trace_lines(
 ):
     """Draw segments (x, y, z of both ends) with strength `seen` in front of all spheres, else `hidden`."""
     border = ti.ceil(half_width, ti.i32) + 1
-    for edge, step in ti.ndrange(ends.shape[0], steps + 1):
+    wide = 2 * border + 1
+    # not a loop in a loop: some drivers leave one after an atomic (`flat_kernels`)
+    for edge, step, n, m in ti.ndrange(ends.shape[0], steps + 1, wide, wide):
         t = ti.cast(step, ti.f32) / ti.cast(steps, ti.f32)
         s = ti.f32(1.0) - t
         run = ends[edge, 3] - ends[edge, 0]
@@ -149,16 +214,15 @@ def trace_lines(
         far = ends[edge, 5]
         # along a straight line in the picture, 1/z is linear under perspective and z without it
         z = ti.select(lens[1] > 0, near * far / ti.max(s * far + t * near, ti.f32(1e-30)), s * near + t * far)
-        if ti.abs(x - lens[2]) < lens[2] and ti.abs(y - lens[3]) < lens[3]:
+        u = ti.floor(x, ti.i32) + m - border
+        v = ti.floor(y, ti.i32) + n - border
+        seen_at_all = ti.abs(x - lens[2]) < lens[2] and ti.abs(y - lens[3]) < lens[3]
+        if seen_at_all and u >= 0 and u < width and v >= 0 and v < height:
             limit = ti.bit_cast(ti.max(z - bias, ti.f32(0.0)), ti.i32)
-            column = ti.floor(x, ti.i32)
-            row = ti.floor(y, ti.i32)
-            for v in range(ti.max(row - border, 0), ti.min(row + border + 1, height)):
-                for u in range(ti.max(column - border, 0), ti.min(column + border + 1, width)):
-                    dx = ti.cast(u, ti.f32) + ti.f32(0.5) - x
-                    dy = ti.cast(v, ti.f32) + ti.f32(0.5) - y
-                    off = ti.abs(dx * rise - dy * run) / length
-                    cover = ti.min(ti.max(half_width + ti.f32(0.5) - off, ti.f32(0.0)), ti.f32(1.0))
-                    p = v * width + u
-                    full = ti.select(limit <= depth[p], seen, hidden)
-                    ti.atomic_max(lines[p], ti.cast(cover * ti.cast(full, ti.f32), ti.i32))
+            dx = ti.cast(u, ti.f32) + ti.f32(0.5) - x
+            dy = ti.cast(v, ti.f32) + ti.f32(0.5) - y
+            off = ti.abs(dx * rise - dy * run) / length
+            cover = ti.min(ti.max(half_width + ti.f32(0.5) - off, ti.f32(0.0)), ti.f32(1.0))
+            p = v * width + u
+            full = ti.select(limit <= depth[p], seen, hidden)
+            ti.atomic_max(lines[p], ti.cast(cover * ti.cast(full, ti.f32), ti.i32))

@@ -4,15 +4,35 @@ The nearest depth per pixel is an integer minimum and ties go to the lowest inde
 give the same bits on one arch, whatever the threads did.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 import taichi as ti
 
+from taichi_rts.backend import has_vulkan_hardware
 from taichi_rts.errors import RenderError
-from taichi_rts.rendering import shade_kernels, splat_kernels
+from taichi_rts.rendering import flat_kernels, lighting, shade_kernels, splat_kernels
 from taichi_rts.rendering.camera import Camera, box_corners, box_edges
 
-SHADOW_SIZE = 1024  # pixels of the shadow map, square
 LINE_COLOUR = (0.16, 0.17, 0.20)
+GROUND_SHADE = 0.5  # opacity of the darkest shadow on the ground
+FLOOR_SHADE = 0.08  # opacity of the floor of the outline, in linear light
+
+
+class Quality(NamedTuple):
+    """What a picture may cost: samples per pixel and axis, samples for occlusion and light, pixels of the shadow map."""
+
+    supersample: int
+    pairs: int
+    taps: int
+    shadow_size: int
+
+
+QUALITIES = {
+    "draft": Quality(1, 0, 0, 1),
+    "good": Quality(2, 8, 8, 1024),
+    "best": Quality(4, 24, 24, 4096),
+}
 
 
 def srgb_to_linear(values) -> np.ndarray:
@@ -54,30 +74,46 @@ class Splatter:
         self,
         width: int = 1280,
         height: int = 720,
-        supersample: int = 2,
+        supersample: int | None = None,
         background=(1, 1, 1),
         shadows: bool = True,
+        *,
+        quality: str = "good",
+        transparent: bool = False,
     ):
-        """Allocate the buffers; `background` is sRGB, `supersample` the samples per pixel and axis."""
+        """Allocate the buffers; `background` is sRGB, `supersample` the samples per pixel and axis if not the quality's.
+
+        `quality` is one of `QUALITIES`; `transparent` pictures have an alpha channel and only shadows for a background.
+        Raises `RenderError` for an unknown quality and for too many samples.
+        """
+        if quality not in QUALITIES:
+            raise RenderError(f"quality {quality!r} is unknown: choose one of {', '.join(QUALITIES)}")
+        self.quality = QUALITIES[quality]
+        supersample = self.quality.supersample if supersample is None else supersample
         if min(width, height) < 1 or not 1 <= supersample <= 8 or width * height * supersample**2 > 2**29:
             raise RenderError(
                 f"picture of {width} x {height} pixels with supersample = {supersample} is impossible: "
-                "sides must be at least 1, supersample 1 to 8, all samples at most 2^29: lower one of them"
+                "sides must be at least 1, supersample 1 to 8, all samples at most 2^29: lower one of them, or the quality"
             )
-        self.width, self.height, self.supersample, self.shadows = width, height, supersample, shadows
+        self.width, self.height, self.supersample, self.transparent = width, height, supersample, transparent
+        self.shadows = shadows and self.quality.taps > 0
         self._background = srgb_to_linear(background)
         self._fine = (width * supersample, height * supersample)
         samples, pixels = self._fine[0] * self._fine[1], width * height
         self._depth, self._nearest, self._lines = (ti.ndarray(ti.i32, samples) for _ in range(3))
-        self._shadow_depth = ti.ndarray(ti.i32, SHADOW_SIZE**2)
+        self._tiles = ti.ndarray(ti.i32, _tile_count(*self._fine))
+        self._shadow_depth = ti.ndarray(ti.i32, self.quality.shadow_size**2)
+        self._shadow_tiles = ti.ndarray(ti.i32, _tile_count(self.quality.shadow_size, self.quality.shadow_size))
         self._veil, self._smooth_veil = (ti.Vector.ndarray(3, ti.f32, pixels) for _ in range(2))
         self._linear = ti.ndarray(ti.f32, 255 * 4 + 1)  # 8-bit colours fall on entries
         self._linear.from_numpy(srgb_to_linear(np.linspace(0, 1, 255 * 4 + 1)))
         self._encode = ti.ndarray(ti.i32, 4096)  # entry k is linear light (k / 4095)^2
         self._encode.from_numpy(np.rint(255 * linear_to_srgb(np.linspace(0, 1, 4096) ** 2)).astype(np.int32))
-        pattern = shade_kernels.sampling_pattern()
-        self._pattern = ti.Vector.ndarray(3, ti.f32, len(pattern))
-        self._pattern.from_numpy(pattern)
+        pattern = shade_kernels.sampling_pattern(self.quality.pairs, self.quality.taps)
+        self._pattern = ti.Vector.ndarray(3, ti.f32, max(len(pattern), 1))
+        if len(pattern):
+            self._pattern.from_numpy(pattern)
+        self._flat = ti.cfg.arch == ti.vulkan and not has_vulkan_hardware()
         self._capacity = 0
         self._reserve(1)
 
@@ -90,7 +126,7 @@ class Splatter:
         self._sprites = ti.Vector.ndarray(4, ti.f32, self._capacity)
 
     def draw(self, positions, colours, radius: float, camera: Camera, outline=None) -> np.ndarray:
-        """Return the picture, (height, width, 3) uint8.
+        """Return the picture, (height, width, 3) uint8, or 4 if `transparent`.
 
         `positions` (N, 2 or 3) [m] and `radius` [m] are in the scene's units, `colours` (N, 3) are
         sRGB in 0 to 1; `outline` is (lower, upper) of a box to draw as a wireframe,
@@ -107,9 +143,10 @@ class Splatter:
         width, height = self._fine
         perspective = camera.orthographic_height is None
         lens = (camera.focal_pixels(height), float(perspective), width / 2, height / 2)
-        box = _bounds(positions, outline)
-        light = _light_direction(camera, basis)
-        light_basis, light_eye, light_lens = _light_view(light, box, radius)
+        box = lighting.bounds(positions, outline)
+        light = lighting.light_direction(camera, basis)
+        size = self.quality.shadow_size
+        light_basis, light_eye, light_lens = lighting.light_view(light, box, radius, size)
 
         clear = splat_kernels.clear_buffer
         clear(self._shadow_depth, splat_kernels.FAR)
@@ -118,15 +155,14 @@ class Splatter:
         clear(self._lines, 0)
         if self.shadows and not flat and count:
             self._project(count, radius, light_eye, light_basis, light_lens)
-            splat_kernels.splat_depths(self._sprites, count, light_lens, SHADOW_SIZE, SHADOW_SIZE, self._shadow_depth)
+            self._splat(count, light_lens, (size, size), self._shadow_tiles, self._shadow_depth)
         if count:
             self._project(count, radius, eye, basis, lens)
-            splat_kernels.splat_depths(self._sprites, count, lens, width, height, self._depth)
-            splat_kernels.splat_numbers(self._sprites, count, lens, width, height, self._depth, self._nearest)
+            self._splat(count, lens, self._fine, self._tiles, self._depth, self._nearest)
         if outline is not None:
             self._trace(outline, camera, lens, radius)
         extent = float(np.linalg.norm(box[1] - box[0]))
-        ground, ground_reach = _ground(camera, basis, box, extent, self.shadows and outline is not None and not flat)
+        ground = lighting.ground_plane(camera, basis, box, extent, self.shadows and outline is not None and not flat)
         reach = max(5 * radius, 0.03 * extent)
         texel = 1.0 / light_lens[0]
         softness = max(0.012 * extent / texel, 1.5)
@@ -134,17 +170,18 @@ class Splatter:
             self._depth,
             self._shadow_depth,
             lens,
-            ground,
-            ground_reach,
+            *ground,
             *(basis @ (light_eye - eye), *(light_basis @ basis.T)),
             light_lens,
-            SHADOW_SIZE,
+            size,
             softness,
             3 * radius + (softness + 1) * texel,
             reach,
             width,
             height,
             self.supersample,
+            self.quality.pairs,
+            self.quality.taps,
             self._pattern,
             self._veil,
         )
@@ -164,7 +201,12 @@ class Splatter:
             basis @ light,
             basis @ (np.asarray(camera.up, float) / np.linalg.norm(camera.up)),
             self._background,
-            0.5 if ground[3] > 0 else 0.0,
+            int(not self.transparent),
+            *ground,
+            GROUND_SHADE if ground[0][3] > 0 else 0.0,
+            FLOOR_SHADE,
+            *lighting.floor_frame(camera, basis, box),
+            (0.0, 0.0, 0.0) if flat or outline is None else lighting.haze(camera, basis, box),
             srgb_to_linear(LINE_COLOUR),
             radius,
             width,
@@ -172,10 +214,33 @@ class Splatter:
             self.supersample,
             picture,
         )
-        return np.ascontiguousarray(picture.view(np.uint8).reshape(self.height, self.width, 4)[:, :, :3])
+        channels = picture.view(np.uint8).reshape(self.height, self.width, 4)
+        return channels if self.transparent else np.ascontiguousarray(channels[:, :, :3])
 
     def _project(self, count: int, radius: float, eye, basis, lens) -> None:
         splat_kernels.project_points(self._points, count, radius, eye, *basis, lens, self._sprites)
+
+    def _splat(self, count: int, lens, size: tuple[int, int], tiles, depth, nearest=None) -> None:
+        """Enter the least depths, and what is nearest: few spheres first, then always more that those do not hide."""
+        if self._flat:
+            self._splat_flat(count, lens, size, depth, nearest)
+            return
+        splat_kernels.clear_buffer(tiles, splat_kernels.FAR)
+        for stride in splat_kernels.STRIDES:
+            splat_kernels.splat_depths(self._sprites, count, stride, lens, *size, tiles, depth)
+            splat_kernels.measure_tiles(depth, *size, tiles)
+        if nearest is not None:
+            splat_kernels.splat_numbers(self._sprites, count, lens, *size, tiles, depth, nearest)
+
+    def _splat_flat(self, count: int, lens, size: tuple[int, int], depth, nearest) -> None:
+        side = 2 * int(np.ceil(self._sprites.to_numpy()[:count, 3].max())) + 1
+        chunk = max(flat_kernels.MOST // side**2, 1)
+        for first in range(0, count, chunk):
+            last = min(first + chunk, count)
+            flat_kernels.splat_depths(self._sprites, first, last, side, lens, *size, depth)
+        for first in range(0, count if nearest is not None else 0, chunk):
+            last = min(first + chunk, count)
+            flat_kernels.splat_numbers(self._sprites, first, last, side, lens, *size, depth, nearest)
 
     def _trace(self, outline, camera: Camera, lens, radius: float) -> None:
         """Draw the wireframe of a box into the line buffer; its edges end at the camera's near plane."""
@@ -203,40 +268,6 @@ class Splatter:
         )
 
 
-def _bounds(positions: np.ndarray, outline) -> tuple[np.ndarray, np.ndarray]:
-    """Return the bounds of the picture: the outline if there is one, so that light stays steady."""
-    if outline is not None:
-        corners = box_corners(*outline)
-        return corners.min(axis=0), corners.max(axis=0)
-    if len(positions) == 0:
-        return np.zeros(3), np.ones(3)
-    return positions.min(axis=0).astype(float), positions.max(axis=0).astype(float)
-
-
-def _light_direction(camera: Camera, basis: np.ndarray) -> np.ndarray:
-    """Return the unit vector to the light: high, over the viewer's left shoulder."""
-    upward = np.asarray(camera.up, float) / np.linalg.norm(camera.up)
-    light = 1.1 * upward - 0.55 * basis[0] - 0.6 * basis[2] + 0.3 * basis[1]
-    return light / np.linalg.norm(light)
-
-
-def _light_view(light: np.ndarray, box, radius: float):
-    """Return basis, origin and lens of the light's parallel view of the whole box."""
-    middle = 0.5 * (box[0] + box[1])
-    reach = 0.5 * float(np.linalg.norm(box[1] - box[0])) + 2 * radius
-    view = Camera(tuple(middle + light * (reach + 2 * radius)), tuple(middle), tuple(np.roll(light, 1)))
-    return (
-        np.array(view.basis()),
-        np.array(view.eye),
-        (SHADOW_SIZE / (2 * reach), 0.0, SHADOW_SIZE / 2, SHADOW_SIZE / 2),
-    )
-
-
-def _ground(camera: Camera, basis: np.ndarray, box, extent: float, wanted: bool):
-    """Return the plane under the box in view coordinates, and how deep it reaches; height 0 for none."""
-    upward = np.asarray(camera.up, float) / np.linalg.norm(camera.up)
-    corners = box_corners(*box)
-    level = float(np.min(corners @ upward))
-    above = float(np.dot(camera.eye, upward)) - level
-    reach = float(np.max(corners @ basis[2] - np.dot(camera.eye, basis[2]))) + extent
-    return (*(basis @ upward), above if wanted and above > 0 else 0.0), reach
+def _tile_count(width: int, height: int) -> int:
+    side = splat_kernels.TILE
+    return -(-width // side) * -(-height // side)

@@ -74,8 +74,9 @@ def draw_text(canvas: ImageDraw.ImageDraw, place, text: str, size: int, fill) ->
 
 
 def panel_of(image, box, alpha: int = 225):
-    """Return (Pillow image, canvas) of a picture with a white panel of rounded corners at `box`."""
-    picture = Image.fromarray(image).convert("RGBA")
+    """Return (Pillow image, canvas) of a picture, RGB or RGBA, with a white panel of rounded corners at `box`."""
+    source = Image.fromarray(image)
+    picture = source.convert("RGBA")
     sheet = Image.new("RGBA", picture.size, (255, 255, 255, 0))
     corner = max(round(0.012 * picture.size[1]), 2)
     ImageDraw.Draw(sheet).rounded_rectangle(
@@ -85,5 +86,5 @@ def panel_of(image, box, alpha: int = 225):
         outline=(120, 125, 135, 200),
         width=max(picture.size[1] // 720, 1),
     )
-    picture = Image.alpha_composite(picture, sheet).convert("RGB")
+    picture = Image.alpha_composite(picture, sheet).convert(source.mode)
     return picture, ImageDraw.Draw(picture)

@@ -72,3 +72,16 @@ def test_edges_join_corners_that_differ_in_one_component():
 def test_impossible_cameras_are_refused(arguments):
     with pytest.raises(RenderError):
         Camera(**{"eye": (0, 0, 1), "target": (0, 0, 0), **arguments})
+
+
+@pytest.mark.parametrize(("angles", "across", "upward"), [((0, 0), 0, 1), ((90, 0), 2, 1), ((0, 89.99), 0, 2)])
+def test_views_without_perspective_are_to_scale(angles, across, upward):
+    lower, upper = np.array([0, 0, 0.0]), np.array([3, 1, 2.0])
+    camera = Camera.framing(lower, upper, *angles, aspect=2.0, perspective=False)
+    flat = camera.project(np.stack([lower, upper]), 800, 400)
+    size = np.abs(np.diff(flat[:, :2], axis=0)[0])
+    scale = camera.focal_pixels(400)
+    assert size == pytest.approx([scale * (upper - lower)[across], scale * (upper - lower)[upward]], rel=1e-3)
+    assert flat[:, :2].min() >= 0
+    assert (flat[:, :2].max(axis=0) <= (800, 400)).all()
+    assert (flat[:, 2] > 0).all()

@@ -87,7 +87,9 @@ def test_modes():
 
 
 def test_unknown_names_list_the_choices():
-    with pytest.raises(RenderError, match=r"'vorticity'.*level, step, lead, speed, density, sound, fluid, plain"):
+    with pytest.raises(
+        RenderError, match=r"'vorticity'.*level, step, lead, speed, density, sound, fluid, pressure, plain"
+    ):
         colour_by("vorticity", levels=[1])
     with pytest.raises(RenderError, match="default, paper"):
         level_colours([1], "nature")

@@ -6,7 +6,14 @@ import pytest
 import taichi_rts as rts
 from taichi_rts.rendering import legend
 from taichi_rts.rendering.colours import level_colours, scalar_colours
-from taichi_rts.rendering.painter import Painter, PictureOptions, level_classes, longest_step, milliseconds
+from taichi_rts.rendering.painter import (
+    Painter,
+    PictureOptions,
+    level_classes,
+    longest_step,
+    make_cameras,
+    milliseconds,
+)
 
 SCENE = rts.load_scene("dam_break_2d")
 NOTHING = SimpleNamespace()  # these tests draw no particles
@@ -82,3 +89,72 @@ def test_steps_and_leads_are_coloured_up_to_the_longest_there_can_be(mode, value
 
 def test_short_base_steps_keep_their_digits():
     assert [milliseconds(t) for t in (0.8128e-3, 0.1016e-3, 0.8819e-6)] == ["0.813", "0.102", "0.000882"]
+
+
+class Canvas:
+    """Draws its camera's name of a picture: as many as there are cameras, each of another grey."""
+
+    def __init__(self, width, height):
+        self.shape, self.seen = (height, width, 3), []
+
+    def draw(self, positions, colours, radius, camera, outline):
+        self.seen.append((camera, positions))
+        return np.full(self.shape, 100 + 20 * len(self.seen), np.uint8)
+
+
+def test_two_views_show_the_same_state_at_one_time_in_a_picture_of_the_asked_size(monkeypatch):
+    scene = rts.load_scene("dam_break")
+    options = PictureOptions(width=1280, height=720, views=("front", "side"))
+    canvas = Canvas(*options.view_size)
+    painter = Painter(scene, options, renderer=canvas)
+    asked = []
+    sim = simulation(rts.Regional(), 2)
+    sim.state = lambda: asked.append(1) or (np.ones((4, 3)), np.zeros((4, 3)), np.full(4, 1e3), np.array([1, 2, 2, 2]))
+    panels = []
+    draw = legend.draw_legend
+    monkeypatch.setattr(legend, "draw_legend", lambda *a, **k: panels.append(a[1:]) or draw(*a, **k))
+    picture = painter.paint(sim)
+    assert picture.shape == (720, 1280, 3)
+    assert len(asked) == 1
+    (front, first), (side, second) = canvas.seen
+    assert first is second
+    assert np.allclose(front.basis()[2], (0, 0, -1))
+    assert np.allclose(side.basis()[2], (-1, 0, 0))
+    assert (picture[360, 300], picture[360, 900]) == (pytest.approx(120), pytest.approx(140))
+    assert [panel[0] for panel in panels] == ["front", "side", ""]
+    assert panels[2][2][0] == "t = 0.250 s"
+
+
+@pytest.mark.parametrize(
+    ("scene", "options", "complaint"),
+    [
+        ("dam_break_2d", {"views": ("front",)}, "two dimensions has one view only"),
+        ("dam_break", {"views": ("front",), "azimuth": 3.0}, "leave out --azimuth"),
+        ("dam_break", {"views": ("front",) * 5}, "5 views in one picture; at most 4"),
+        ("dam_break", {"transparent": True, "renderer": "ggui"}, "--renderer splatter"),
+    ],
+)
+def test_views_that_cannot_be_are_refused(scene, options, complaint):
+    with pytest.raises(rts.Error, match=complaint):
+        make_cameras(rts.load_scene(scene), PictureOptions(**options))
+
+
+def test_text_and_panels_are_three_times_as_large_in_4k():
+    sim, level = simulation(rts.Regional(), 2), np.array([1, 2, 2, 2])
+    sizes = []
+    for height in (720, 2160):
+        painter = Painter(SCENE, PictureOptions(height=height), renderer=NOTHING)
+        blank = np.full((height, height * 16 // 9, 4), (9, 9, 9, 0), np.uint8)
+        rows, columns = np.nonzero(painter._label(blank, sim, level)[..., 3])
+        sizes.append((np.ptp(rows), np.ptp(columns)))
+    assert np.divide(*sizes[::-1]) == pytest.approx(3, rel=0.05)
+
+
+def test_pressure_is_coloured_up_to_that_of_the_largest_speed():
+    sim = simulation(rts.Uniform(), 1)
+    sim.medium = SimpleNamespace(equation_of_state=SimpleNamespace(pressure_numpy=lambda rho: 1e3 * (rho - 1000)))
+    painter = Painter(SCENE, PictureOptions(colour_by="pressure"), renderer=NOTHING)
+    rho = 1000 + 1e-3 * painter.top_pressure * np.array([0, 0.25, 0.5, 2])
+    got = painter.colours(sim, np.zeros((4, 2)), rho, np.ones(4, int))
+    assert np.allclose(got, scalar_colours([0, 0.25, 0.5, 1], 0, 1), atol=0.01)
+    assert painter.top_pressure == pytest.approx(500 * SCENE.estimate_max_speed() ** 2)

@@ -2,7 +2,9 @@ import numpy as np
 import pytest
 import taichi as ti
 
+from taichi_rts import backend
 from taichi_rts.errors import RenderError
+from taichi_rts.rendering import splat_kernels
 from taichi_rts.rendering.camera import Camera
 from taichi_rts.rendering.splatter import Splatter, linear_to_srgb, srgb_to_linear
 
@@ -126,6 +128,65 @@ def test_fluid_above_the_floor_casts_a_shadow_on_it(splatter):
     assert 50 < grey.sum() < 0.2 * WIDTH * HEIGHT
 
 
+def test_a_block_is_darker_under_one_that_floats_above_it(splatter):
+    side = 0.05 * np.arange(12)
+    slab = np.stack(np.meshgrid(side, [0.0], side, indexing="ij"), axis=-1).reshape(-1, 3)
+    lid = slab[(np.abs(slab - 0.275) < 0.16)[:, [0, 2]].all(axis=1)] + (0.0, 0.2, 0.0)
+    box = ((0, 0, 0), (0.55, 0.5, 0.55))
+    camera = Camera.framing(*box, elevation=15, aspect=WIDTH / HEIGHT)
+    open_, covered_ = (
+        splatter.draw(points, np.full_like(points, 0.7), 0.03, camera, box).astype(float)
+        for points in (slab, np.concatenate([slab, lid]))
+    )
+    x, y, _ = camera.project(np.array([[0.275, 0.03, 0.35]]), WIDTH, HEIGHT)[0].astype(int)
+    patch = np.s_[y - 2 : y + 3, x - 2 : x + 3]
+    assert covered_[patch].mean() < 0.85 * open_[patch].mean()
+    plain = Splatter(WIDTH, HEIGHT, quality="draft")
+    bare = [plain.draw(p, np.full_like(p, 0.7), 0.03, camera, box)[patch] for p in (slab, np.concatenate([slab, lid]))]
+    assert np.array_equal(*bare)
+
+
+@pytest.mark.parametrize(("quality", "shades"), [("draft", 0), ("good", 3), ("best", 8)])
+def test_edges_have_intermediate_values(taichi_cpu, quality, shades):
+    camera = Camera((0, 0, 10), (0, 0, 0), field_of_view=30.0)
+    splatter = Splatter(WIDTH, HEIGHT, quality=quality, transparent=True)
+    alpha = splatter.draw(np.zeros((1, 3)), np.array([GREY]), 1.5, camera)[..., 3]
+    between = np.unique(alpha[(alpha > 0) & (alpha < 255)])
+    assert len(between) >= shades
+    assert len(between) < splatter.supersample**2
+    assert alpha.sum() / 255 == pytest.approx(np.pi * (1.5 * camera.focal_pixels(HEIGHT) / 10) ** 2, rel=0.02)
+
+
+def test_transparent_picture_over_white_is_the_opaque_one(splatter):
+    positions, colours = cloud(300)
+    box = ((-1.5,) * 3, (1.5,) * 3)
+    camera = Camera.framing(*box, elevation=30, aspect=WIDTH / HEIGHT)
+    clear = Splatter(WIDTH, HEIGHT, transparent=True).draw(positions, colours, 0.15, camera, box)
+    solid = splatter.draw(positions, colours, 0.15, camera, box)
+    assert clear[0, 0].tolist()[3] == 0
+    assert clear[..., 3].max() == 255
+    ground = (clear[..., 3] > 0) & (clear[..., :3] == 0).all(axis=2)
+    assert ground.sum() > 100  # shadows and floor are black of little opacity
+    alpha = clear[..., 3:] / 255
+    over = linear_to_srgb(srgb_to_linear(clear[..., :3] / 255) * alpha + 1 - alpha) * 255
+    assert np.abs(over - solid).max() <= 3
+
+
+def test_spheres_far_away_are_nearer_to_the_background(splatter):
+    box = ((-1, -1, -4), (1, 1, 4))
+    camera = Camera((0, 0, 12), (0, 0, 0), orthographic_height=2.0)
+    draw = [splatter.draw(np.array([[0, 0, z]]), np.array([RED]), 0.5, camera, box) for z in (3.0, -3.0)]
+    near, far = (picture[HEIGHT // 2, WIDTH // 2].astype(int) for picture in draw)
+    assert (far[1:] > near[1:] + 10).all()
+
+
+def test_no_hidden_sphere_is_missed(splatter, monkeypatch):
+    positions, colours = cloud(20000, seed=3)
+    tiled = splatter.draw(positions, colours, 0.1, FRONT)
+    monkeypatch.setattr(splat_kernels, "STRIDES", (1,))  # then nothing is hidden before all are drawn
+    assert np.array_equal(tiled, splatter.draw(positions, colours, 0.1, FRONT))
+
+
 def test_plane_positions_are_discs(splatter):
     camera = Camera.framing((0, 0), (3, 2), aspect=WIDTH / HEIGHT)
     picture = splatter.draw(np.array([[1.0, 0.5]]), np.array([BLUE]), 0.3, camera)
@@ -142,6 +203,17 @@ def test_default_precision_of_the_run_does_not_matter(taichi_cpu, tmp_path):
     ti.init(arch=ti.cpu, default_fp=ti.f64, offline_cache_file_path=str(tmp_path), log_level=ti.ERROR)
     double = Splatter(WIDTH, HEIGHT).draw(positions, colours, 0.1, FRONT).astype(int)
     assert (np.abs(single - double).max(axis=2) > 2).mean() < 1e-3
+
+
+def test_vulkan_draws_what_the_processor_draws(start_taichi):
+    if not backend.vulkan_device_types():
+        pytest.skip("no Vulkan driver on this machine")
+    positions, colours = cloud(60)
+    box, pictures = ((-1.5,) * 3, (1.5,) * 3), []
+    for arch in ("cpu", "vulkan"):
+        with start_taichi(arch):
+            pictures.append(Splatter(WIDTH, HEIGHT).draw(positions, colours, 0.2, FRONT, box).astype(int))
+    assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 2).mean() < 1e-3
 
 
 def test_tables_are_inverse():
@@ -161,6 +233,11 @@ def test_tables_are_inverse():
 def test_wrong_arrays_are_refused(splatter, positions, colours, radius, complaint):
     with pytest.raises(RenderError, match=complaint):
         splatter.draw(positions, colours, radius, FRONT)
+
+
+def test_unknown_quality_is_refused():
+    with pytest.raises(RenderError, match="'superb' is unknown: choose one of draft, good, best"):
+        Splatter(64, 64, quality="superb")
 
 
 def test_impossible_pictures_are_refused():
