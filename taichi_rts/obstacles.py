@@ -12,14 +12,14 @@ from pydantic.dataclasses import dataclass
 
 from taichi_rts.errors import SceneError
 from taichi_rts.shapes import Box
-from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, validated
+from taichi_rts.validation import FROZEN, NotNegative, Number, Positive, Vector, validated
 
 
 def _as_tuple(value: Any) -> Any:
     return (value,) if isinstance(value, (int, float)) and not isinstance(value, bool) else value
 
 
-Turn = Annotated[tuple[float, ...], Len(1, 3), BeforeValidator(_as_tuple)]
+Turn = Annotated[tuple[Number, ...], Len(1, 3), BeforeValidator(_as_tuple)]
 """A rotation: in two dimensions one number, counter-clockwise; in three a vector along the axis, as long as the angle."""
 
 
@@ -201,8 +201,8 @@ class SphereObstacle:
 class CylinderObstacle:
     """A round cylinder with `radius` [m] whose axis goes from `start` to `end` [m], (3,)."""
 
-    start: Annotated[tuple[float, ...], Len(3, 3)]
-    end: Annotated[tuple[float, ...], Len(3, 3)]
+    start: Annotated[tuple[Number, ...], Len(3, 3)]
+    end: Annotated[tuple[Number, ...], Len(3, 3)]
     radius: Positive
     motion: Motion | None = None
     shape: Literal["cylinder"] = "cylinder"
@@ -220,7 +220,7 @@ class CylinderObstacle:
 class PolygonObstacle:
     """A polygon in two dimensions with corners `points` [m], (K, 2), in either direction, whose edges do not cross."""
 
-    points: Annotated[tuple[Annotated[tuple[float, ...], Len(2, 2)], ...], Len(3)]
+    points: Annotated[tuple[Annotated[tuple[Number, ...], Len(2, 2)], ...], Len(3)]
     motion: Motion | None = None
     shape: Literal["polygon"] = "polygon"
     dim = 2
@@ -250,7 +250,7 @@ class MeshObstacle:
     file: str
     scale: Positive = 1.0
     rotation: Turn | None = None
-    translation: Annotated[tuple[float, ...], Len(3, 3)] = (0.0, 0.0, 0.0)
+    translation: Annotated[tuple[Number, ...], Len(3, 3)] = (0.0, 0.0, 0.0)
     motion: Motion | None = None
     shape: Literal["mesh"] = "mesh"
     dim = 3

@@ -27,7 +27,7 @@ from taichi_rts.probes import Gauge, Probe
 from taichi_rts.scene_checks import contradictions
 from taichi_rts.shapes import Block, Box, Fluid, Sphere, top_speed
 from taichi_rts.sound import FLOOR, RegionalSound, SoundSpeed
-from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, describe, validated
+from taichi_rts.validation import FROZEN, NotNegative, Number, Positive, Vector, describe, validated
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -45,8 +45,8 @@ BUILT_IN = Path(__file__).parent / "scenes"
 class View:
     """Where pictures are taken from: `azimuth` and `elevation` [degrees] around the domain, or `eye` and `target` [m]."""
 
-    azimuth: float = -35.0
-    elevation: Annotated[float, Field(ge=-90, le=90)] = 20.0
+    azimuth: Number = -35.0
+    elevation: Annotated[Number, Field(ge=-90, le=90)] = 20.0
     eye: Vector | None = None
     target: Vector | None = None
     zoom: Positive = 1.0
@@ -98,7 +98,7 @@ class Scene:
     density: Literal["summation", "continuity"] = "summation"
     background_pressure: NotNegative = 0.0
     kernel: Literal["cubic_spline", "wendland_c2"] = "cubic_spline"
-    support_ratio: Annotated[float, Field(ge=1.5, le=4.0)] = 2.0
+    support_ratio: Annotated[Number, Field(ge=1.5, le=4.0)] = 2.0
     rest_density: Positive = 1000.0
     artificial_viscosity: NotNegative = 0.08
     kinematic_viscosity: NotNegative = 0.0
