@@ -87,14 +87,24 @@ def _drowned_faults(scene: Scene, solids: list[tuple[int, Solid]]) -> list[str]:
             np.linspace(a, b, max(1, int((b - a) / scene.spacing)) * 2 + 1)[1::2]
             for a, b in zip(fluid.lower, fluid.upper, strict=True)
         ]
-        points = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, scene.dim)
-        if isinstance(fluid, Sphere):
-            points = points[np.linalg.norm(points - np.array(fluid.centre), axis=1) <= fluid.radius]
         for k, solid in solids:
             near = ((solid.lower < fluid.upper) & (solid.upper > fluid.lower)).all()
-            if near and len(points) and (solid.distance(points) < 0.5 * scene.spacing).all():
+            if near and _lies_within(solid, 0.5 * scene.spacing, fluid, steps):
                 faults.append(f"fluids.{n}: lies wholly inside obstacles.{k}; move or shrink one of them")
     return faults
+
+
+def _lies_within(solid: Solid, margin: float, fluid: Any, axes: list[np.ndarray]) -> bool:
+    """Whether all points of the lattice of `axes` that are in the fluid are in the solid, or nearer than `margin` [m]."""
+    found = False
+    for x in axes[0]:  # a layer at a time bounds the memory, and most often the first decides
+        points = np.stack(np.meshgrid([x], *axes[1:], indexing="ij"), axis=-1).reshape(-1, len(axes))
+        if isinstance(fluid, Sphere):
+            points = points[np.linalg.norm(points - np.array(fluid.centre), axis=1) <= fluid.radius]
+        if (solid.distance(points) >= margin).any():
+            return False
+        found = found or len(points) > 0
+    return found
 
 
 def _text(x: np.ndarray) -> str:

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import pydantic
 from annotated_types import Len
-from pydantic import Field, model_validator
+from pydantic import Field, StringConstraints, model_validator
 from pydantic.dataclasses import dataclass
 
 from taichi_rts.bodies import bodies
@@ -25,16 +24,13 @@ from taichi_rts.obstacles import SHAPES, ConstantMotion, Keyframes, Obstacle
 from taichi_rts.particle_fluid import Particles
 from taichi_rts.probes import Gauge, Probe
 from taichi_rts.scene_checks import contradictions
+from taichi_rts.scene_files import NAME, name_for, read_toml, with_files_beside
 from taichi_rts.shapes import Block, Box, Fluid, Sphere, top_speed
 from taichi_rts.sound import FLOOR, RegionalSound, SoundSpeed
 from taichi_rts.validation import FROZEN, NotNegative, Number, Positive, Vector, describe, validated
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
 LARGEST_RATIO = 32.0  # of sound speeds in one scene
+MOST_PARTS = 1000  # fluids or obstacles of a scene: each is compared with each
 WORTHWHILE = 2.0
 """Ratio of the one sound speed to the smallest regional one from which on regional ones pay (docs/regional_sound_speed.md)."""
 BUILT_IN = Path(__file__).parent / "scenes"
@@ -89,7 +85,7 @@ class Scene:
     """
 
     domain: Box
-    fluids: Annotated[tuple[Fluid, ...], Len(1)]
+    fluids: Annotated[tuple[Fluid, ...], Len(1, MOST_PARTS)]
     spacing: Positive
     gravity: Vector | None = None
     gravity_changes: tuple[GravityChange, ...] = ()
@@ -109,10 +105,10 @@ class Scene:
     inflows: tuple[Inflow, ...] = ()
     probes: tuple[Probe, ...] = ()
     gauges: tuple[Gauge, ...] = ()
-    obstacles: tuple[Obstacle, ...] = ()
+    obstacles: Annotated[tuple[Obstacle, ...], Len(0, MOST_PARTS)] = ()
     end_time: Positive = 1.0
     view: View = Field(default_factory=View)
-    name: str = "scene"
+    name: Annotated[str, StringConstraints(pattern=NAME, max_length=100)] = "scene"
     description: str = ""
 
     @model_validator(mode="after")
@@ -318,42 +314,12 @@ def load_scene(name: str | Path, *, particles: float | str | None = None, **chan
         if not path.is_file():
             known = ", ".join(scene_names())
             raise SceneError(f"scene {str(name)!r} is unknown; choose one of {known}, or name a .toml file")
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SceneError(f"scene file {str(path)!r} cannot be read: {error.strerror}; check the path") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SceneError(f"scene file {str(path)!r} is not valid TOML: {error}") from None
-    data = with_files_beside({"name": path.stem} | data, path)
+    data = with_files_beside({"name": name_for(path)} | read_toml(path), path)
     if particles is not None:
         if "spacing" in changes:
             raise SceneError(f"particles {particles!r} and spacing {changes['spacing']!r} are both given; give one")
         data["spacing"] = _spacing_for(scene_from(data, str(path)), parse_count(particles))
     return scene_from(data | changes, str(path))
-
-
-def with_files_beside(data: dict[str, Any], path: Path) -> dict[str, Any]:
-    """Return the data of the scene file `path` with the files of its particles and meshes relative to its folder.
-
-    Raises `SceneError` for a file outside that folder.
-    """
-    folder = path.resolve().parent
-    resolved: dict[str, Any] = {}
-    for key in ("fluids", "obstacles"):
-        parts = data.get(key)
-        if not isinstance(parts, list):
-            continue
-        resolved[key] = []
-        for k, part in enumerate(parts):
-            if isinstance(part, dict) and isinstance(part.get("file"), str):
-                file = (folder / part["file"]).resolve()
-                if not file.is_relative_to(folder):
-                    raise SceneError(
-                        f"{path}: {key}.{k}.file: {part['file']!r} leaves the scene's folder {str(folder)!r}; put it there"
-                    )
-                part = part | {"file": str(file)}
-            resolved[key].append(part)
-    return data | resolved
 
 
 def scene_from(data: dict[str, Any], source: str = "scene") -> Scene:

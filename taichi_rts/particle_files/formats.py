@@ -78,6 +78,8 @@ def read_particles(path: str | Path) -> ParticleFrame:
     if read is None:
         raise SceneError(f"particle file {str(path)!r} has none of the known suffixes {', '.join(READ)}; convert it")
     try:
+        if path.exists() and not path.is_file():
+            raise SceneError(f"particle file {str(path)!r} is a folder or a device; name a file")
         data = path.read_bytes()
     except OSError as error:
         raise SceneError(f"particle file {str(path)!r} cannot be read: {error.strerror}; check the path") from None

@@ -1,0 +1,75 @@
+"""What is read from a scene's file: plain data, of bounded size, that names no file outside of its folder."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from taichi_rts.errors import SceneError
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+LARGEST_FILE = 1 << 20
+"""Bytes that a scene file may have: what is longer belongs into a file of particles or a mesh."""
+NAME = r"^[\w()+-][\w .()+-]*$"
+"""What a scene may be called: a folder of results gets its name, so it holds no separators."""
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return what a TOML file holds; raises `SceneError` if it cannot be read, is none, or is longer than `LARGEST_FILE`."""
+    try:
+        with path.open("rb") as file:
+            text = file.read(LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:  # a zero byte in a path is no OSError
+        reason = getattr(error, "strerror", None) or error
+        raise SceneError(f"scene file {str(path)!r} cannot be read: {reason}; check the path") from None
+    if len(text) > LARGEST_FILE:
+        raise SceneError(
+            f"scene file {str(path)!r} is longer than {LARGEST_FILE} bytes; put particles and meshes into files of their own"
+        )
+    try:
+        return tomllib.loads(text.decode("utf-8"))
+    except (ValueError, RecursionError) as error:  # whatever the text is that is no TOML
+        raise SceneError(f"scene file {str(path)!r} is not valid TOML: {error}; correct it") from None
+
+
+def name_for(path: Path) -> str:
+    """Return the name of the scene in a file that gives it none."""
+    return re.sub(r"[^\w .()+-]", "_", path.stem)[:100].lstrip(" .") or "scene"
+
+
+def with_files_beside(data: dict[str, Any], path: Path) -> dict[str, Any]:
+    """Return the data of the scene file `path` with the files of its particles and meshes relative to its folder.
+
+    Raises `SceneError` for a file outside that folder.
+    """
+    folder = path.resolve().parent
+    resolved: dict[str, Any] = {}
+    for key in ("fluids", "obstacles"):
+        parts = data.get(key)
+        if not isinstance(parts, list):
+            continue
+        resolved[key] = []
+        for k, part in enumerate(parts):
+            if isinstance(part, dict) and isinstance(part.get("file"), str):
+                file = _resolved(folder, part["file"])
+                if file is None or not file.is_relative_to(folder):
+                    raise SceneError(
+                        f"{path}: {key}.{k}.file: {part['file']!r} leaves the scene's folder {str(folder)!r}; put it there"
+                    )
+                part = part | {"file": str(file)}
+            resolved[key].append(part)
+    return data | resolved
+
+
+def _resolved(folder: Path, file: str) -> Path | None:
+    """Return the path of `file` in `folder`, with links followed; None if there can be none of that name."""
+    try:
+        return (folder / file).resolve()
+    except (OSError, ValueError, RuntimeError):  # a zero byte, or links in a circle
+        return None
