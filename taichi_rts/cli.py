@@ -180,6 +180,7 @@ class Run:
         recording.exporter(scene.dim)  # here, so that what is wrong is said before anything starts
         frames = len(frame_times(scene.end_time, self.export_fps))
         check_size(self.width, self.height)
+        check_angles(self.azimuth, self.elevation)
         with Interrupts() as interrupts:
             device = rts.init(self.arch, self.precision or "f32")
             with Recorder(
@@ -293,6 +294,14 @@ def check_size(width: int, height: int) -> None:
     """Raise `OutputError` for a picture that cannot be made or looked at."""
     if not (64 <= width <= 8192 and 64 <= height <= 8192):
         raise OutputError(f"picture of {width} x {height} pixels: both sides must be 64 to 8192; try 1280 and 720")
+
+
+def check_angles(azimuth: float | None, elevation: float | None) -> None:
+    """Raise `OutputError` for a view that there is not."""
+    if azimuth is not None and not -360.0 <= azimuth <= 360.0:
+        raise OutputError(f"--azimuth {azimuth:g} is no angle from -360 to 360 degrees; try -35")
+    if elevation is not None and not -90.0 <= elevation <= 90.0:
+        raise OutputError(f"--elevation {elevation:g} is no angle from -90 to 90 degrees; try 20")
 
 
 def main(args: list[str] | None = None) -> None:

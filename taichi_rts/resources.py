@@ -27,8 +27,10 @@ LINING = 10 * SAMPLING
 """Bytes of the host per boundary particle of an obstacle and dimension: they are chosen from about ten times as many points."""
 COMPILED = 400 << 20
 """Bytes that Python, the compiler and compiled kernels take besides."""
-BLOCK_INTEGERS = 14
-"""Fields of 32-bit integers with an entry for each block, at most (asynchronous steps have 12, regional ones 8)."""
+BLOCK_INTEGERS = {"uniform": 1, "regional": 7, "asynchronous": 11}
+"""Fields of 32-bit integers that each stepper has with an entry for each block."""
+FIXED = 1 << 17
+"""Bytes of fields whose size does not depend on the scene, about."""
 SOUND_REALS = 10
 """Fields of reals with an entry for each block that a regional sound speed needs."""
 FINEST_POSITION = 0.01
@@ -53,13 +55,17 @@ def device_bytes(
     reals += 3 * dim + 3 if debug else 0
     reals += 2 * moving
     integers += 1 + bool(scene.inflows)
-    per_block = INTEGER * (2 * CELLS + (CELLS + 1) * (1 + moving) + BLOCK_INTEGERS) + real * SOUND_REALS * regional
+    per_block = (
+        INTEGER * (2 * CELLS + (CELLS + 1) * (1 + moving) + BLOCK_INTEGERS[stepper.name])
+        + real * SOUND_REALS * regional
+    )
     nodes = sum(_nodes(scene, spacing))
     return (
         size.particles * (real * reals + INTEGER * integers)
         + (size.walls + _lining(scene, spacing)) * real * (2 * dim + 1)
         + size.blocks * per_block
         + nodes * real
+        + FIXED
     )
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import imageio.v3 as imageio
 import numpy as np
 
+from taichi_rts import backend
 from taichi_rts.diagnostics import Energy
 from taichi_rts.errors import CheckpointError, Interrupted, OutputError
 from taichi_rts.frames import frame_times
@@ -29,10 +30,13 @@ from taichi_rts.output.video import Gif, Video, require_video
 from taichi_rts.panels import Panel
 from taichi_rts.rendering import legend
 from taichi_rts.rendering.painter import Painter, PictureOptions, make_renderer
+from taichi_rts.resources import require
 from taichi_rts.scene import Scene
 from taichi_rts.simulation import Simulation
 from taichi_rts.stepping.steppers import stepper_data
 
+MOST_CHECKPOINTS = 100_000
+PIXEL_BYTES = 90  # that a renderer with four samples a pixel takes, and its picture
 PNG_COMPRESSION = 3  # of 9: 40 instead of 120 ms a frame for 10 % more bytes
 
 
@@ -92,6 +96,10 @@ class Recorder:
         if recording.export and len(steppers) > 1:
             raise OutputError("--export writes the particles of one run, and there are several; leave out --panels")
         self.exporter = recording.exporter(scene.dim)
+        frame_times(scene.end_time, recording.fps)
+        require_checkpoint_times(scene.end_time, recording.checkpoint_every)
+        pixels = PIXEL_BYTES * options.width * options.height if recording.pictures else 0
+        require(scene, steppers, backend.current(), debug=debug, pictures=pixels)  # before anything is made or removed
         self.scene = scene
         self.panels = panels
         self.recording = recording
@@ -307,6 +315,15 @@ def checkpoint_times(end_time: float, every: float | None) -> Iterator[float]:
             break
         yield time
     yield end_time
+
+
+def require_checkpoint_times(end_time: float, every: float | None) -> None:
+    """Raise `OutputError` if there would be more than `MOST_CHECKPOINTS`."""
+    if every is not None and end_time / every > MOST_CHECKPOINTS:
+        raise OutputError(
+            f"--checkpoint-every {every:g} s makes {end_time / every:.3g} checkpoints until {end_time:g} s, more than "
+            f"{MOST_CHECKPOINTS}; use at least {end_time / MOST_CHECKPOINTS:.3g}"
+        )
 
 
 def describe_run(sim: Simulation, initial_energy: Any) -> dict[str, Any]:
