@@ -166,8 +166,8 @@ def require_clock(scene: Scene, stepper: Any, end_time: float | None = None) -> 
     if not (tick > 0.0 and end_time <= tick * MAX_TICKS):
         raise ResourceError(
             f"end_time {end_time:g} s takes {end_time / tick if tick > 0.0 else math.inf:.3g} ticks of {tick:.3g} s, more than "
-            f"the {MAX_TICKS} that can be counted; end at {tick * MAX_TICKS:.3g} s at the latest, or use a larger spacing, "
-            "a smaller sound_speed or a smaller viscosity"
+            f"{MAX_TICKS} that are counted; end at {tick * MAX_TICKS:.3g} s at the latest, or use a larger courant or spacing, "
+            "or a smaller sound_speed or viscosity"
         )
 
 

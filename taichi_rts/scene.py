@@ -47,6 +47,17 @@ class View:
     target: Vector | None = None
     zoom: Positive = 1.0
 
+    @model_validator(mode="after")
+    def _check(self) -> View:
+        given = [place for place in (self.eye, self.target) if place is not None]
+        if len(given) == 1:
+            raise ValueError("eye and target go together; give both, or azimuth and elevation instead")
+        if given and (len(given[0]) != 3 or len(given[1]) != 3 or given[0] == given[1]):
+            raise ValueError(
+                f"eye {self.eye} and target {self.target} must be two places of 3 components each; move one"
+            )
+        return self
+
 
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)

@@ -22,7 +22,7 @@ from taichi_rts.errors import CheckpointError, Interrupted, OutputError
 from taichi_rts.frames import frame_times
 from taichi_rts.output.checkpoint import Checkpoint, write
 from taichi_rts.output.export import DEFAULT_ATTRIBUTES, Exporter
-from taichi_rts.output.files import prepare_folder, write_bytes, write_json
+from taichi_rts.output.files import prepare_folder, require_free, write_bytes, write_json
 from taichi_rts.output.lock import FolderLock
 from taichi_rts.output.resume import checkpoint_name, newest, output_folder
 from taichi_rts.output.series import Series
@@ -96,6 +96,8 @@ class Recorder:
         if recording.export and len(steppers) > 1:
             raise OutputError("--export writes the particles of one run, and there are several; leave out --panels")
         self.exporter = recording.exporter(scene.dim)
+        if checkpoint is None:
+            require_free(recording.folder, recording.overwrite)  # not even a lock is made in another run's folder
         frame_times(scene.end_time, recording.fps)
         require_checkpoint_times(scene.end_time, recording.checkpoint_every)
         pixels = PIXEL_BYTES * options.width * options.height if recording.pictures else 0

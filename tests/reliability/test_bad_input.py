@@ -1,7 +1,13 @@
-"""Every row of bad_input_rows.py: exit code 2, one message with value, limit and remedy, within 2 s, nothing on disk changes."""
+"""Every row of bad_fields, bad_scenes and bad_commands is refused as a whole.
+
+Exit code 2, one message with value, limit and remedy, within 2 s, and nothing on disk changes.
+"""
 
 import pytest
-from bad_input_rows import COMMANDS, SCENES, field_rows, prepare
+from bad_commands import COMMANDS
+from bad_fields import field_rows
+from bad_scenes import SCENES
+from rows import prepare
 from scenes import FLAT, SOLID, to_toml
 from trial import attempt, fill
 
@@ -11,7 +17,7 @@ from taichi_rts.output import recorder
 ARGS = ("run", "scene.toml", "--arch", "cpu", "--output-dir", "out")
 
 
-class Started(Exception):
+class StartedError(Exception):
     """A run has begun that should not."""
 
 
@@ -26,7 +32,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def never_starts(monkeypatch, kernel_cache):
     def start(*_args, **_options):
-        raise Started
+        raise StartedError
 
     monkeypatch.setattr(recorder, "Simulation", start)
 
