@@ -13,7 +13,7 @@ import tyro
 import taichi_rts as rts
 from taichi_rts import backend, report
 from taichi_rts.compare.command import Compare
-from taichi_rts.errors import CheckpointError, Error, OutputError, SimulationDivergedError
+from taichi_rts.errors import CheckpointError, Error, OutputError
 from taichi_rts.extremes import Extremes
 from taichi_rts.output.checkpoint import Checkpoint
 from taichi_rts.output.export import DEFAULT_ATTRIBUTES
@@ -29,7 +29,6 @@ from taichi_rts.output.resume import (
 from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
 from taichi_rts.rendering.painter import Mode, PictureOptions
 from taichi_rts.stability.command import Stability
-from taichi_rts.stability.diagnosis import FirstDiagnoses
 from taichi_rts.stepping.steppers import STEPPERS
 
 
@@ -186,24 +185,13 @@ class Run:
             with Recorder(
                 scene, panels, self.picture(), recording, debug=self.debug, checkpoint=checkpoint
             ) as recorder:
-                diagnoses, extremes = FirstDiagnoses(recorder.runs), Extremes(recorder.runs)
+                diagnoses, extremes = recorder.guard, Extremes(recorder.runs)
                 recorder.notes["extremes"] = extremes.data
                 if checkpoint and "extremes" in checkpoint.extra:
                     extremes.take(checkpoint.extra["extremes"])
-
-                def look() -> None:
-                    diagnoses.look()
-                    extremes.look()
-
                 interrupts.defer()
-                try:
-                    with report.progress(recorder.runs, scene.end_time, device, look) as on_frame:
-                        recorder.record(scene.end_time, on_frame, interrupts.asked)
-                except SimulationDivergedError:
-                    diagnoses.look()
-                    for diagnosis in diagnoses.found.values():
-                        report.print_diagnosis(diagnosis)
-                    raise
+                with report.progress(recorder.runs, scene.end_time, device, extremes.look) as on_frame:
+                    recorder.record(scene.end_time, on_frame, interrupts.asked)
         for stepper, sim in recorder.runs.items():
             report.print_table(
                 sim, recorder.initial_energy[stepper], diagnoses.found.get(stepper), extremes.facts(stepper)

@@ -23,6 +23,7 @@ ARTEFACTS = (
     "series_2.csv",
     "series_3.csv",
     "checkpoints",
+    "blow_up",
 )
 """What a run writes, and all that --overwrite removes."""
 

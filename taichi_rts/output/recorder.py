@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import heapq
 import itertools
@@ -18,8 +19,9 @@ import numpy as np
 
 from taichi_rts import backend
 from taichi_rts.diagnostics import Energy
-from taichi_rts.errors import CheckpointError, Interrupted, OutputError
+from taichi_rts.errors import CheckpointError, Interrupted, OutputError, SimulationDivergedError
 from taichi_rts.frames import frame_times
+from taichi_rts.output.blow_up import BlowUpGuard
 from taichi_rts.output.checkpoint import Checkpoint, write
 from taichi_rts.output.export import DEFAULT_ATTRIBUTES, Exporter
 from taichi_rts.output.files import prepare_folder, require_free, write_bytes, write_json
@@ -116,6 +118,7 @@ class Recorder:
                 self.initial_energy = {stepper: sim.energy() for stepper, sim in self.runs.items()}
             else:
                 self._take_up(checkpoint)
+            self.guard = BlowUpGuard(self.runs, recording.folder)
             self.times = frame_times(scene.end_time, recording.fps)[: self.frames_done]
             self.exporter.take_up(self.times)
             self.series = [
@@ -186,7 +189,7 @@ class Recorder:
         """Run to `end_time` [s], write all frames and checkpoints, and return what `run.json` holds.
 
         Once `stop_asked()` it writes a checkpoint and raises `Interrupted`. Raises `OutputError` where something cannot be
-        written, with what is whole and how to go on.
+        written, with what is whole and how to go on, and `SimulationDivergedError` once no run is whole (`BlowUpGuard`).
         """
         for sim in self.runs.values():
             sim.stop_asked = stop_asked
@@ -194,7 +197,9 @@ class Recorder:
         try:
             for time, number in self.moments(end_time):
                 for sim in self.runs.values():
-                    sim.advance_to(max(time, sim.time))
+                    with contextlib.suppress(SimulationDivergedError):  # which the guard says in full
+                        sim.advance_to(max(time, sim.time))
+                self.guard.look()
                 if number is None:
                     self.save_checkpoint()
                 else:

@@ -56,6 +56,8 @@ VALID = {
     "view.zoom": {"missing"},
     "obstacles.3.scale": {"missing"},
     "obstacles.3.translation": {"missing"},
+    "2D: fluids.0.velocity": {"missing"},
+    "2D: fluids.1.velocity": {"missing"},
     "2D: fluids.0.velocity.depth": {"missing"},
     "2D: sound_speed": {"missing"},
     "2D: sound_speed.mach": {"missing"},
