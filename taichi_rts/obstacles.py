@@ -267,7 +267,7 @@ SHAPES = {
 
 def _shape_tag(data: Any) -> str | None:
     shape = data.get("shape") if isinstance(data, dict) else getattr(data, "shape", None)
-    return f"<{shape}>" if shape in SHAPES else None
+    return f"<{shape}>" if isinstance(shape, str) and shape in SHAPES else None
 
 
 Obstacle = Annotated[
