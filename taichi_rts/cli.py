@@ -188,7 +188,8 @@ class Run:
                 diagnoses, extremes = recorder.guard, Extremes(recorder.runs)
                 recorder.notes["extremes"] = extremes.data
                 if checkpoint and "extremes" in checkpoint.extra:
-                    extremes.take(checkpoint.extra["extremes"])
+                    with checkpoint.archive.trusted_by_nobody():
+                        extremes.take(checkpoint.extra["extremes"])
                 interrupts.defer()
                 with report.progress(recorder.runs, scene.end_time, device, extremes.look) as on_frame:
                     recorder.record(scene.end_time, on_frame, interrupts.asked)
@@ -204,7 +205,8 @@ class Run:
         until = finished_until(folder) if folder is not None else -1.0
         try:
             with open_checkpoint(path) as checkpoint:
-                run, scene, panels = continued(self, path, checkpoint)
+                with checkpoint.archive.trusted_by_nobody():
+                    run, scene, panels = continued(self, path, checkpoint)
                 done = until >= scene.end_time * (1 - 1e-9) and not self.overwrite and self.output_dir in (None, folder)
                 if not done:
                     run.record(scene, panels, checkpoint)

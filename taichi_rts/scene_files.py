@@ -67,6 +67,23 @@ def with_files_beside(data: dict[str, Any], path: Path) -> dict[str, Any]:
     return data | resolved
 
 
+def require_files_near(data: dict[str, Any], path: Path, source: str) -> None:
+    """Raise `SceneError` if the scene in the checkpoint `path` names a file that lies neither here nor near the checkpoint.
+
+    Here is the present folder and all below it; near is all below the folder that the run's own lies in.
+    """
+    folders = (Path.cwd(), path.resolve().parent.parent.parent)
+    for key in ("fluids", "obstacles"):
+        for k, part in enumerate(data.get(key, ())):
+            if isinstance(part, dict) and isinstance(part.get("file"), str):
+                file = _resolved(Path.cwd(), part["file"])
+                if file is None or not any(file.is_relative_to(folder) for folder in folders):
+                    raise SceneError(
+                        f"{source}: {key}.{k}.file: {part['file']!r} is neither below {folders[0]} nor below {folders[1]}; "
+                        "if it is yours, go on in its folder"
+                    )
+
+
 def _resolved(folder: Path, file: str) -> Path | None:
     """Return the path of `file` in `folder`, with links followed; None if there can be none of that name."""
     try:

@@ -117,7 +117,8 @@ class Recorder:
                 self.runs = {stepper: Simulation(scene, stepper, debug=debug) for stepper in steppers}
                 self.initial_energy = {stepper: sim.energy() for stepper, sim in self.runs.items()}
             else:
-                self._take_up(checkpoint)
+                with checkpoint.archive.trusted_by_nobody():
+                    self._take_up(checkpoint)
             self.guard = BlowUpGuard(self.runs, recording.folder)
             self.times = frame_times(scene.end_time, recording.fps)[: self.frames_done]
             self.exporter.take_up(self.times)
@@ -128,6 +129,8 @@ class Recorder:
             self.painters = self._make_painters(options) if recording.pictures else []
         except BaseException:
             self.lock.release()
+            with contextlib.suppress(OSError):  # if there is something in it
+                recording.folder.rmdir()
             raise
 
     def _make_painters(self, options: PictureOptions) -> list[Painter]:
