@@ -15,7 +15,7 @@ import taichi_rts as rts
 from taichi_rts import backend, report
 from taichi_rts.benchmarks.command import Bench
 from taichi_rts.compare.command import Compare
-from taichi_rts.errors import CheckpointError, Error, OutputError, SimulationDivergedError
+from taichi_rts.errors import CheckpointError, Error, OutputError
 from taichi_rts.extremes import Extremes
 from taichi_rts.output.checkpoint import Checkpoint
 from taichi_rts.output.export import DEFAULT_ATTRIBUTES
@@ -32,7 +32,6 @@ from taichi_rts.output.side_by_side import SideBySide
 from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
 from taichi_rts.rendering.painter import Mode, PictureOptions, View, make_cameras
 from taichi_rts.stability.command import Stability
-from taichi_rts.stability.diagnosis import FirstDiagnoses
 from taichi_rts.stepping.steppers import STEPPERS
 
 
@@ -192,6 +191,7 @@ class Run:
         recording.exporter(scene.dim)  # here, so that what is wrong is said before anything starts
         frames = len(frame_times(scene.end_time, self.export_fps))
         check_size(self.width, self.height)
+        check_angles(self.azimuth, self.elevation)
         for panel in panels:
             make_cameras(scene, dataclasses.replace(self.picture(), **panel.options))
         with Interrupts() as interrupts:
@@ -199,24 +199,14 @@ class Run:
             with Recorder(
                 scene, panels, self.picture(), recording, debug=self.debug, checkpoint=checkpoint
             ) as recorder:
-                diagnoses, extremes = FirstDiagnoses(recorder.runs), Extremes(recorder.runs)
+                diagnoses, extremes = recorder.guard, Extremes(recorder.runs)
                 recorder.notes["extremes"] = extremes.data
                 if checkpoint and "extremes" in checkpoint.extra:
-                    extremes.take(checkpoint.extra["extremes"])
-
-                def look() -> None:
-                    diagnoses.look()
-                    extremes.look()
-
+                    with checkpoint.archive.trusted_by_nobody():
+                        extremes.take(checkpoint.extra["extremes"])
                 interrupts.defer()
-                try:
-                    with report.progress(recorder.runs, scene.end_time, device, look) as on_frame:
-                        recorder.record(scene.end_time, on_frame, interrupts.asked)
-                except SimulationDivergedError:
-                    diagnoses.look()
-                    for diagnosis in diagnoses.found.values():
-                        report.print_diagnosis(diagnosis)
-                    raise
+                with report.progress(recorder.runs, scene.end_time, device, extremes.look) as on_frame:
+                    recorder.record(scene.end_time, on_frame, interrupts.asked)
         for stepper, sim in recorder.runs.items():
             report.print_table(
                 sim, recorder.initial_energy[stepper], diagnoses.found.get(stepper), extremes.facts(stepper)
@@ -229,7 +219,8 @@ class Run:
         until = finished_until(folder) if folder is not None else -1.0
         try:
             with open_checkpoint(path) as checkpoint:
-                run, scene, panels = continued(self, path, checkpoint)
+                with checkpoint.archive.trusted_by_nobody():
+                    run, scene, panels = continued(self, path, checkpoint)
                 done = until >= scene.end_time * (1 - 1e-9) and not self.overwrite and self.output_dir in (None, folder)
                 if not done:
                     run.record(scene, panels, checkpoint)
@@ -315,6 +306,14 @@ def check_size(width: int, height: int) -> None:
     """Raise `OutputError` for a picture that cannot be made or looked at."""
     if not (64 <= width <= 8192 and 64 <= height <= 8192):
         raise OutputError(f"picture of {width} x {height} pixels: both sides must be 64 to 8192; try 1280 and 720")
+
+
+def check_angles(azimuth: float | None, elevation: float | None) -> None:
+    """Raise `OutputError` for a view that there is not."""
+    if azimuth is not None and not -360.0 <= azimuth <= 360.0:
+        raise OutputError(f"--azimuth {azimuth:g} is no angle from -360 to 360 degrees; try -35")
+    if elevation is not None and not -90.0 <= elevation <= 90.0:
+        raise OutputError(f"--elevation {elevation:g} is no angle from -90 to 90 degrees; try 20")
 
 
 def main(args: list[str] | None = None) -> None:

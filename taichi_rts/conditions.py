@@ -11,7 +11,7 @@ from pydantic.dataclasses import dataclass
 
 from taichi_rts.errors import SceneError
 from taichi_rts.shapes import Box, box_reach
-from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, validated
+from taichi_rts.validation import FROZEN, NotNegative, Number, Positive, Vector, validated
 
 AXES = ("x", "y", "z")
 Axis = Literal["x", "y", "z"]
@@ -52,7 +52,7 @@ class MovingWall:
 
     face: Face
     times: Annotated[tuple[NotNegative, ...], Len(2)]
-    displacements: Annotated[tuple[float, ...], Len(2)]
+    displacements: Annotated[tuple[Number, ...], Len(2)]
 
     @model_validator(mode="after")
     def _check(self) -> MovingWall:

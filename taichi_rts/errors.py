@@ -23,6 +23,10 @@ class TimeError(Error, ValueError):
     """A time was asked for that lies in the past or is not a number."""
 
 
+class ResourceError(Error, MemoryError):
+    """A run needs more memory, or more ticks of its clock, than there are."""
+
+
 class OutputError(Error, OSError):
     """Something cannot be written where it was asked for."""
 

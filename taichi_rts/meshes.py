@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,8 @@ def load_mesh(obstacle: MeshObstacle) -> Any:
             f"mesh file {obstacle.file!r} cannot be read without {error.name}; install it: pip install 'taichi_rts[mesh]'"
         ) from None
     try:
-        mesh = trimesh.load_mesh(path, process=True)
+        # From bytes: a material library or a texture that the file names is never looked for.
+        mesh = trimesh.load_mesh(io.BytesIO(path.read_bytes()), file_type=path.suffix[1:].lower(), process=True)
     except Exception as error:  # readers raise anything for a file that is not what its name says
         raise SceneError(f"mesh file {obstacle.file!r} cannot be read: {error}; export it again") from None
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:

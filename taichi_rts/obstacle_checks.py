@@ -93,14 +93,19 @@ def is_drowned(fluid: Block | Sphere | Particles, solid: Solid, spacing: float) 
     """Whether a fluid lies wholly in a solid, or nearer to it than half of `spacing` [m]."""
     if not ((solid.lower < fluid.upper) & (solid.upper > fluid.lower)).all():
         return False
-    steps = [
+    axes = [
         np.linspace(a, b, max(1, int((b - a) / spacing)) * 2 + 1)[1::2]
         for a, b in zip(fluid.lower, fluid.upper, strict=True)
     ]
-    points = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, len(steps))
-    if isinstance(fluid, Sphere):
-        points = points[np.linalg.norm(points - np.array(fluid.centre), axis=1) <= fluid.radius]
-    return bool(len(points)) and bool((solid.distance(points) < 0.5 * spacing).all())
+    found = False
+    for x in axes[0]:  # a layer at a time bounds the memory, and most often the first decides
+        points = np.stack(np.meshgrid([x], *axes[1:], indexing="ij"), axis=-1).reshape(-1, len(axes))
+        if isinstance(fluid, Sphere):
+            points = points[np.linalg.norm(points - np.array(fluid.centre), axis=1) <= fluid.radius]
+        if (solid.distance(points) >= 0.5 * spacing).any():
+            return False
+        found = found or len(points) > 0
+    return found
 
 
 def _text(x: np.ndarray) -> str:

@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass
 from taichi_rts.errors import SceneError
 from taichi_rts.rotations import Turn, number_or_list, rotation_matrix
 from taichi_rts.shapes import Box
-from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, validated
+from taichi_rts.validation import FROZEN, NotNegative, Number, Positive, Vector, validated
 
 
 def _as_scale(value: Any) -> Any:
@@ -206,8 +206,8 @@ class SphereObstacle:
 class CylinderObstacle:
     """A round cylinder with `radius` [m] whose axis goes from `start` to `end` [m], (3,)."""
 
-    start: Annotated[tuple[float, ...], Len(3, 3)]
-    end: Annotated[tuple[float, ...], Len(3, 3)]
+    start: Annotated[tuple[Number, ...], Len(3, 3)]
+    end: Annotated[tuple[Number, ...], Len(3, 3)]
     radius: Positive
     motion: Motion | None = None
     shape: Literal["cylinder"] = "cylinder"
@@ -225,7 +225,7 @@ class CylinderObstacle:
 class PolygonObstacle:
     """A polygon in two dimensions with corners `points` [m], (K, 2), in either direction, whose edges do not cross."""
 
-    points: Annotated[tuple[Annotated[tuple[float, ...], Len(2, 2)], ...], Len(3)]
+    points: Annotated[tuple[Annotated[tuple[Number, ...], Len(2, 2)], ...], Len(3)]
     motion: Motion | None = None
     shape: Literal["polygon"] = "polygon"
     dim = 2
@@ -255,7 +255,7 @@ class MeshObstacle:
     file: str
     scale: Scale = (1.0, 1.0, 1.0)
     rotation: Turn | None = None
-    translation: Annotated[tuple[float, ...], Len(3, 3)] = (0.0, 0.0, 0.0)
+    translation: Annotated[tuple[Number, ...], Len(3, 3)] = (0.0, 0.0, 0.0)
     motion: Motion | None = None
     shape: Literal["mesh"] = "mesh"
     dim = 3
@@ -272,7 +272,7 @@ SHAPES = {
 
 def _shape_tag(data: Any) -> str | None:
     shape = data.get("shape") if isinstance(data, dict) else getattr(data, "shape", None)
-    return f"<{shape}>" if shape in SHAPES else None
+    return f"<{shape}>" if isinstance(shape, str) and shape in SHAPES else None
 
 
 Obstacle = Annotated[

@@ -163,7 +163,7 @@ def print_folder(folder: Path, frames: int, files: Mapping[str, Any]) -> None:
     exports.pop("frames/NNNNNN.png", None)
     particles = f"files of {frames} frames in {', '.join(str(folder / path) for path in exports)}, " if exports else ""
     series = f"time series in {folder / files['series'][0]}, "
-    console.print(f"{pictures}{particles}{series}facts in {folder / 'run.json'}", soft_wrap=True)
+    console.print(f"{pictures}{particles}{series}facts in {folder / 'run.json'}", soft_wrap=True, markup=False)
 
 
 def print_finished(folder: Path, end_time: float) -> None:
@@ -172,6 +172,7 @@ def print_finished(folder: Path, end_time: float) -> None:
         f"{folder} is finished (t = {end_time:g} s); a later --end-time goes on, --overwrite runs again from the checkpoint",
         soft_wrap=True,
         highlight=False,
+        markup=False,
     )
 
 

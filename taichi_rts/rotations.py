@@ -8,6 +8,8 @@ import numpy as np
 from annotated_types import Len
 from pydantic import BeforeValidator, WithJsonSchema
 
+from taichi_rts.validation import Number
+
 
 def _as_tuple(value: Any) -> Any:
     return (value,) if isinstance(value, (int, float)) and not isinstance(value, bool) else value
@@ -19,7 +21,7 @@ def number_or_list(least: int) -> WithJsonSchema:
     return WithJsonSchema({"anyOf": [{"type": "number"}, numbers]})
 
 
-Turn = Annotated[tuple[float, ...], Len(1, 3), BeforeValidator(_as_tuple), number_or_list(1)]
+Turn = Annotated[tuple[Number, ...], Len(1, 3), BeforeValidator(_as_tuple), number_or_list(1)]
 """A rotation: in two dimensions one number, counter-clockwise; in three a vector along the axis, as long as the angle."""
 
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 import pydantic
 from annotated_types import Len
-from pydantic import Field, model_validator
+from pydantic import Field, StringConstraints, model_validator
 from pydantic.dataclasses import dataclass
 
 from taichi_rts.bodies import bodies
@@ -25,13 +25,14 @@ from taichi_rts.obstacles import Obstacle
 from taichi_rts.particle_fluid import Particles
 from taichi_rts.probes import Gauge, Probe
 from taichi_rts.scene_checks import contradictions
-from taichi_rts.scene_files.reading import SUFFIXES, read_scene_file
+from taichi_rts.scene_files.reading import NAME, SUFFIXES, read_scene_file
 from taichi_rts.schema import keys_at, schema_of
 from taichi_rts.shapes import Box, Fluid, top_speed
 from taichi_rts.sound import FLOOR, RegionalSound, SoundSpeed
-from taichi_rts.validation import FROZEN, NotNegative, Positive, Vector, describe, validated
+from taichi_rts.validation import FROZEN, NotNegative, Number, Positive, Vector, describe, validated
 
 LARGEST_RATIO = 32.0  # of sound speeds in one scene
+MOST_PARTS = 1000  # fluids or obstacles of a scene: each is compared with each
 WORTHWHILE = 2.0
 """Ratio of the one sound speed to the smallest regional one from which on regional ones pay (docs/regional_sound_speed.md)."""
 BUILT_IN = Path(__file__).parent / "scenes"
@@ -42,11 +43,22 @@ BUILT_IN = Path(__file__).parent / "scenes"
 class View:
     """Where pictures are taken from: `azimuth` and `elevation` [degrees] around the domain, or `eye` and `target` [m]."""
 
-    azimuth: float = -35.0
-    elevation: Annotated[float, Field(ge=-90, le=90)] = 20.0
+    azimuth: Number = -35.0
+    elevation: Annotated[Number, Field(ge=-90, le=90)] = 20.0
     eye: Vector | None = None
     target: Vector | None = None
     zoom: Positive = 1.0
+
+    @model_validator(mode="after")
+    def _check(self) -> View:
+        given = [place for place in (self.eye, self.target) if place is not None]
+        if len(given) == 1:
+            raise ValueError("eye and target go together; give both, or azimuth and elevation instead")
+        if given and (len(given[0]) != 3 or len(given[1]) != 3 or given[0] == given[1]):
+            raise ValueError(
+                f"eye {self.eye} and target {self.target} must be two places of 3 components each; move one"
+            )
+        return self
 
 
 @validated(SceneError)
@@ -87,7 +99,7 @@ class Scene:
     """
 
     domain: Box
-    fluids: Annotated[tuple[Fluid, ...], Len(1)]
+    fluids: Annotated[tuple[Fluid, ...], Len(1, MOST_PARTS)]
     spacing: Positive
     gravity: Vector | None = None
     gravity_changes: tuple[GravityChange, ...] = ()
@@ -96,7 +108,7 @@ class Scene:
     density: Literal["summation", "continuity"] = "summation"
     background_pressure: NotNegative = 0.0
     kernel: Literal["cubic_spline", "wendland_c2"] = "cubic_spline"
-    support_ratio: Annotated[float, Field(ge=1.5, le=4.0)] = 2.0
+    support_ratio: Annotated[Number, Field(ge=1.5, le=4.0)] = 2.0
     rest_density: Positive = 1000.0
     artificial_viscosity: NotNegative = 0.08
     kinematic_viscosity: NotNegative = 0.0
@@ -108,10 +120,10 @@ class Scene:
     outlets: tuple[Outlet, ...] = ()
     probes: tuple[Probe, ...] = ()
     gauges: tuple[Gauge, ...] = ()
-    obstacles: tuple[Obstacle, ...] = ()
+    obstacles: Annotated[tuple[Obstacle, ...], Len(0, MOST_PARTS)] = ()
     end_time: Positive = 1.0
     view: View = Field(default_factory=View)
-    name: str = "scene"
+    name: Annotated[str, StringConstraints(pattern=NAME, max_length=100)] = "scene"
     description: str = ""
 
     @model_validator(mode="after")

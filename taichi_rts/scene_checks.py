@@ -11,6 +11,8 @@ from taichi_rts.neighbours import mean_occupancy, nearest_pair
 from taichi_rts.obstacle_checks import obstacle_faults
 from taichi_rts.particle_fluid import LEAST_DISTANCE, Particles
 from taichi_rts.probes import names
+from taichi_rts.range_checks import range_faults
+from taichi_rts.scene_size import size_faults
 from taichi_rts.shapes import Block, Sphere, separation
 
 if TYPE_CHECKING:
@@ -24,7 +26,9 @@ SINGLE = 1e-6
 
 def contradictions(scene: Scene) -> list[str]:
     """Find what is wrong between fields that are each valid."""
-    faults = []
+    faults = size_faults(scene)
+    if faults:
+        return faults  # whatever looks closer would take memory for so many
     dim = scene.dim
     if scene.gravity is not None and len(scene.gravity) != dim:
         faults.append(f"gravity {scene.gravity} has {len(scene.gravity)} components; the domain has {dim}")
@@ -43,7 +47,7 @@ def contradictions(scene: Scene) -> list[str]:
     faults += obstacle_faults(scene)
     if not faults and _guesses_speed(scene) and scene.estimate_max_speed() <= 0.0:
         faults.append("sound_speed: nothing falls or moves at the start, so no default follows; give it a value [m/s]")
-    return faults
+    return faults or range_faults(scene)
 
 
 def _guesses_speed(scene: Scene) -> bool:

@@ -33,6 +33,7 @@ from taichi_rts.physics.obstacles import Keeper, MovingBody
 from taichi_rts.physics.sound_rule import SoundRule
 from taichi_rts.physics.viscosity import viscosity_terms
 from taichi_rts.physics.walls import Walls
+from taichi_rts.resources import require
 from taichi_rts.sampling import Sample, sample
 from taichi_rts.scene import Scene
 from taichi_rts.solids import distance_grid, make_solid
@@ -89,6 +90,7 @@ class Simulation:
         self.stepper = stepper if stepper is not None else cast(Stepper, Regional())
         self.scene = scene = scene.with_sound_for(self.stepper)
         self.backend = backend
+        require(scene, [self.stepper], backend, debug=debug)
         start = sample(scene)
         self.medium = Medium.of(scene, start.mass)
         self.timeline = self.stepper.timeline(scene)

@@ -11,14 +11,16 @@ from typing import Annotated, Any, TypeVar
 import pydantic
 from annotated_types import Len
 from PIL import ImageColor
-from pydantic import AfterValidator, ConfigDict, Field
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticKnownError
 
 from taichi_rts.errors import Error
 
 FROZEN = ConfigDict(extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=False)
-Vector = Annotated[tuple[float, ...], Len(2, 3)]
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
+LARGEST = 1e12
+"""Largest magnitude of a number in a scene or a stepper, in SI units: the square of a larger one soon leaves single precision."""
+LEAST = 1e-12
+"""Least value of a number that has to be above 0."""
 Colour = Annotated[str, AfterValidator(lambda name: _known_colour(name))]
 """A colour by its name in HTML or as "#RRGGBB"."""
 T = TypeVar("T", bound=type)
@@ -47,6 +49,30 @@ def _known_colour(name: str) -> str:
     except ValueError:
         raise ValueError(f"{name!r} is no colour; give a name such as 'orange', or '#RRGGBB'") from None
     return name
+
+
+def _require_number(value: Any) -> Any:
+    if isinstance(value, (bool, str)):  # which pydantic would take for 1 and for what the text says
+        raise PydanticKnownError("float_type")
+    return value
+
+
+def _require_bounded(value: float) -> float:
+    if abs(value) > LARGEST:
+        raise ValueError(f"{value:g} is beyond {LARGEST:g}; give a smaller number, in SI units")
+    return value
+
+
+def _require_sizeable(value: float) -> float:
+    if value < LEAST:
+        raise ValueError(f"{value:g} is below {LEAST:g}; give a larger number, in SI units")
+    return value
+
+
+Number = Annotated[float, BeforeValidator(_require_number), AfterValidator(_require_bounded)]
+Vector = Annotated[tuple[Number, ...], Len(2, 3)]
+Positive = Annotated[Number, Field(gt=0), AfterValidator(_require_sizeable)]
+NotNegative = Annotated[Number, Field(ge=0)]
 
 
 def describe(error: pydantic.ValidationError, subject: str, names: Iterable[str] = (), keys: Keys | None = None) -> str:

@@ -6,6 +6,7 @@ precision, versions. A simulation is built anew from its scene and its stepper, 
 
 from __future__ import annotations
 
+import math
 import platform
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
@@ -19,6 +20,7 @@ from taichi_rts import backend
 from taichi_rts.errors import CheckpointError, Error
 from taichi_rts.output.archive import Archive, open_archive, write_archive
 from taichi_rts.scene import Scene, scene_from
+from taichi_rts.scene_files.reading import require_files_near
 from taichi_rts.simulation import Simulation
 from taichi_rts.state import State
 from taichi_rts.stepping.steppers import stepper_data, stepper_from
@@ -97,12 +99,19 @@ class Checkpoint:
                 )
         try:
             self.arch, self.precision = str(header["arch"]), str(header["precision"])
+            if self.arch not in backend.ARCHES or self.precision not in backend.PRECISIONS:
+                raise ValueError(f"arch {self.arch}, precision {self.precision}")
             self.extra, self.runs = dict(header["extra"]), list(header["runs"])
             self.steppers = [stepper_from(run["stepper"]) for run in self.runs]
-            self.scenes = [scene_from(run["scene"], f"scene of {archive.path}") for run in self.runs]
+            source = f"scene of {archive.path}"
+            for data in (*(run["scene"] for run in self.runs), self.extra.get("scene", {})):
+                require_files_near(data, archive.path, source)
+            self.scenes = [scene_from(run["scene"], source) for run in self.runs]
             self.debug = bool(self.runs[0]["debug"])
             self.time = min(float(run["time"]) for run in self.runs)
-        except (KeyError, IndexError, TypeError, ValueError) as error:
+            if not 0.0 <= self.time < math.inf:
+                raise ValueError(f"time {self.time} is none")
+        except (AttributeError, LookupError, TypeError, ValueError) as error:
             raise archive.error(f"has a header that cannot be used: {error}") from None
 
     def simulation(self, run: int, scene: Scene | None = None) -> Simulation:
@@ -120,24 +129,35 @@ class Checkpoint:
                 f'call init(precision="{self.precision}")'
             )
         state = State(sim)
+        with self.archive.trusted_by_nobody():
+            self._restore(run, data, state)
+
+    def _restore(self, run: int, data: Mapping[str, Any], state: State) -> None:
         self._compare("field", set(data["fields"]), set(state.fields))
         self._compare("part", set(data["values"]), set(state.owners))
         wanted = {}  # all is read before anything is changed
         for name, field in state.fields.items():
             dtype = np.dtype(_numpy_type(field.dtype))
             wanted[name] = self.archive.array(f"{run}/{name}", dtype, (*field.shape, *_entry_shape(field)))
-        for name, field in state.fields.items():
-            field.from_numpy(wanted[name])
         present: dict[str, set[str]] = {owner: set() for owner in state.owners}
         for path, name, _value in state.values():
             present[path].add(name)
+        changes: list[tuple[dict[str, Any], str, Any]] = []
         for path, owner in state.owners.items():
-            for name in present[path] - set(data["values"][path]):
-                del owner[name]  # hides what the class says, such as `Schedule.needs_sorting`
             for name, value in data["values"][path].items():
                 key = f"{run}/{VALUE}{path}.{name}"
                 if name not in owner or _encoded(owner[name], key, {}) != value or _holds_arrays(value):
-                    owner[name] = self._decoded(value, key, owner.get(name))
+                    found = self._decoded(value, key, owner.get(name))
+                    if not _alike(found, owner.get(name)):
+                        raise TypeError(f"{path}.{name} is {_short(found)} and should be like {_short(owner[name])}")
+                    changes.append((owner, name, found))
+        for name, field in state.fields.items():
+            field.from_numpy(wanted[name])
+        for path, owner in state.owners.items():
+            for name in present[path] - set(data["values"][path]):
+                del owner[name]  # hides what the class says, such as `Schedule.needs_sorting`
+        for owner, name, value in changes:
+            owner[name] = value
 
     def _compare(self, what: str, there: set[str], here: set[str]) -> None:
         if there != here:
@@ -163,6 +183,14 @@ def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> str:
     keys = [key for key in dict.fromkeys([*there, *here]) if there.get(key) != here.get(key)]
     keys = ["name"] if "name" in keys else keys
     return ", ".join(f"{key} {_short(there.get(key))} there and {_short(here.get(key))} here" for key in keys)
+
+
+def _alike(found: Any, present: Any) -> bool:
+    """Whether one may take the place of the other: of one kind, or None, and a number if that is one."""
+    if found is None or present is None or isinstance(found, type(present)):
+        return not isinstance(found, float) or isinstance(present, np.ndarray) or found == found
+    numbers = (int, float, np.integer, np.floating)
+    return isinstance(found, numbers) and isinstance(present, numbers) and found == found
 
 
 def _short(value: Any) -> str:

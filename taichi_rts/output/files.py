@@ -27,6 +27,7 @@ ARTEFACTS = (
     "series_2.csv",
     "series_3.csv",
     "checkpoints",
+    "blow_up",
 )
 """What a run writes, and all that --overwrite removes."""
 
@@ -78,8 +79,7 @@ def prepare_folder(folder: Path, overwrite: bool, resumed: Path | None = None) -
     no run wrote are never touched. A run that goes on in the folder of the checkpoint `resumed` keeps all that is there; nor is
     that file ever removed from elsewhere.
     """
-    require_folder(folder)
-    found = [name for name in ARTEFACTS if (folder / name).exists()]
+    found = require_free(folder, overwrite or resumed is not None)
     if resumed is not None:
         if resumed.resolve().parent == (folder / "checkpoints").resolve():
             require_writable(folder)
@@ -88,13 +88,21 @@ def prepare_folder(folder: Path, overwrite: bool, resumed: Path | None = None) -
         places = (resumed.resolve(), *resumed.resolve().parents)
         if overwrite and any((folder / name).resolve() in places for name in found):
             raise OutputError(f"{resumed} lies in what {folder} would be cleared of; choose another --output-dir")
+    require_free(folder, overwrite)
+    require_writable(folder)
+    remove(folder, found)
+    folder.mkdir(parents=True, exist_ok=True)
+
+
+def require_free(folder: Path, overwrite: bool) -> list[str]:
+    """Return what an earlier run has left in `folder`; raises `OutputError` if that is anything and `overwrite` is off."""
+    require_folder(folder)
+    found = [name for name in ARTEFACTS if (folder / name).exists()]
     if found and not overwrite:
         raise OutputError(
             f"{folder} already holds a run ({', '.join(found)}); choose another --output-dir, or give --overwrite"
         )
-    require_writable(folder)
-    remove(folder, found)
-    folder.mkdir(parents=True, exist_ok=True)
+    return found
 
 
 def require_folder(folder: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import heapq
 import itertools
@@ -16,12 +17,14 @@ from typing import Any
 import imageio.v3 as imageio
 import numpy as np
 
+from taichi_rts import backend
 from taichi_rts.diagnostics import Energy
-from taichi_rts.errors import CheckpointError, Interrupted, OutputError
+from taichi_rts.errors import CheckpointError, Interrupted, OutputError, SimulationDivergedError
 from taichi_rts.frames import frame_times
+from taichi_rts.output.blow_up import BlowUpGuard
 from taichi_rts.output.checkpoint import Checkpoint, write
 from taichi_rts.output.export import DEFAULT_ATTRIBUTES, Exporter
-from taichi_rts.output.files import prepare_folder, write_json, write_png
+from taichi_rts.output.files import prepare_folder, require_free, write_json, write_png
 from taichi_rts.output.lock import FolderLock
 from taichi_rts.output.resume import checkpoint_name, newest, output_folder
 from taichi_rts.output.series import Series
@@ -29,9 +32,13 @@ from taichi_rts.output.video import Gif, Video, require_video
 from taichi_rts.panels import Panel
 from taichi_rts.rendering import legend
 from taichi_rts.rendering.painter import Painter, PictureOptions, make_renderer
+from taichi_rts.resources import require
 from taichi_rts.scene import Scene
 from taichi_rts.simulation import Simulation
 from taichi_rts.stepping.steppers import stepper_data
+
+MOST_CHECKPOINTS = 100_000
+PIXEL_BYTES = 90  # that a renderer with four samples a pixel takes, and its picture
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,6 +97,12 @@ class Recorder:
         if recording.export and len(steppers) > 1:
             raise OutputError("--export writes the particles of one run, and there are several; leave out --panels")
         self.exporter = recording.exporter(scene.dim)
+        if checkpoint is None:
+            require_free(recording.folder, recording.overwrite)  # not even a lock is made in another run's folder
+        frame_times(scene.end_time, recording.fps)
+        require_checkpoint_times(scene.end_time, recording.checkpoint_every)
+        pixels = PIXEL_BYTES * options.width * options.height if recording.pictures else 0
+        require(scene, steppers, backend.current(), debug=debug, pictures=pixels)  # before anything is made or removed
         self.scene = scene
         self.panels = panels
         self.recording = recording
@@ -103,7 +116,9 @@ class Recorder:
                 self.runs = {stepper: Simulation(scene, stepper, debug=debug) for stepper in steppers}
                 self.initial_energy = {stepper: sim.energy() for stepper, sim in self.runs.items()}
             else:
-                self._take_up(checkpoint)
+                with checkpoint.archive.trusted_by_nobody():
+                    self._take_up(checkpoint)
+            self.guard = BlowUpGuard(self.runs, recording.folder)
             self.times = frame_times(scene.end_time, recording.fps)[: self.frames_done]
             self.exporter.take_up(self.times)
             self.series = [
@@ -113,6 +128,8 @@ class Recorder:
             self.painters = self._make_painters(options) if recording.pictures else []
         except BaseException:
             self.lock.release()
+            with contextlib.suppress(OSError):  # if there is something in it
+                recording.folder.rmdir()
             raise
 
     def _make_painters(self, options: PictureOptions) -> list[Painter]:
@@ -174,7 +191,7 @@ class Recorder:
         """Run to `end_time` [s], write all frames and checkpoints, and return what `run.json` holds.
 
         Once `stop_asked()` it writes a checkpoint and raises `Interrupted`. Raises `OutputError` where something cannot be
-        written, with what is whole and how to go on.
+        written, with what is whole and how to go on, and `SimulationDivergedError` once no run is whole (`BlowUpGuard`).
         """
         for sim in self.runs.values():
             sim.stop_asked = stop_asked
@@ -182,7 +199,9 @@ class Recorder:
         try:
             for time, number in self.moments(end_time):
                 for sim in self.runs.values():
-                    sim.advance_to(max(time, sim.time))
+                    with contextlib.suppress(SimulationDivergedError):  # which the guard says in full
+                        sim.advance_to(max(time, sim.time))
+                self.guard.look()
                 if number is None:
                     self.save_checkpoint()
                 else:
@@ -304,6 +323,15 @@ def checkpoint_times(end_time: float, every: float | None) -> Iterator[float]:
             break
         yield time
     yield end_time
+
+
+def require_checkpoint_times(end_time: float, every: float | None) -> None:
+    """Raise `OutputError` if there would be more than `MOST_CHECKPOINTS`."""
+    if every is not None and end_time / every > MOST_CHECKPOINTS:
+        raise OutputError(
+            f"--checkpoint-every {every:g} s makes {end_time / every:.3g} checkpoints until {end_time:g} s, more than "
+            f"{MOST_CHECKPOINTS}; use at least {end_time / MOST_CHECKPOINTS:.3g}"
+        )
 
 
 def describe_run(sim: Simulation, initial_energy: Any) -> dict[str, Any]:

@@ -6,12 +6,12 @@ component. Points are x, y, z, w and then their attributes.
 
 from __future__ import annotations
 
-import gzip
 import struct
 
 import numpy as np
 
 from taichi_rts.particle_files.frame import ParticleFrame, from_arrays
+from taichi_rts.particle_files.unpacking import gunzip
 
 MAGIC = b"BgeoV"
 VERSION = 5
@@ -48,7 +48,7 @@ def write_bgeo(frame: ParticleFrame) -> bytes:
 def read_bgeo(data: bytes) -> ParticleFrame:
     """Read the points of a BGEO file, gzipped or not; raises `ValueError` if it is none of version 5."""
     if data[:2] == b"\x1f\x8b":
-        data = gzip.decompress(data)
+        data = gunzip(data)
     if data[:5] != MAGIC:
         raise ValueError("it does not begin as a classic BGEO file does")
     version, count, _prims, _groups, _prim_groups, attributes, *_ = struct.unpack_from(">9i", data, 5)

@@ -77,6 +77,8 @@ def read_particles(path: str | Path) -> ParticleFrame:
     read = READ.get(path.suffix.lower())
     if read is None:
         raise SceneError(f"particle file {str(path)!r} has none of the known suffixes {', '.join(READ)}; convert it")
+    if path.exists() and not path.is_file():  # a device may have no end
+        raise SceneError(f"particle file {str(path)!r} is no file but a folder or a device; check the path")
     try:
         data = path.read_bytes()
     except OSError as error:

@@ -8,6 +8,7 @@ import zipfile
 import numpy as np
 
 from taichi_rts.particle_files.frame import ParticleFrame, from_arrays, from_columns
+from taichi_rts.particle_files.unpacking import require_sizes
 
 PLURALS = {"positions": "position", "velocities": "velocity", "densities": "density"}
 
@@ -23,6 +24,8 @@ def write_npz(frame: ParticleFrame) -> bytes:
 def read_npz(data: bytes) -> ParticleFrame:
     """Read an npz file; names may be plural. Raises `ValueError` if it is none, or needs pickle."""
     try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            require_sizes(archive, len(data))
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
             arrays = {PLURALS.get(name, name): file[name] for name in file.files}
     except (zipfile.BadZipFile, EOFError, KeyError, AttributeError) as error:

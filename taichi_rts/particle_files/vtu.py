@@ -58,6 +58,8 @@ def read_vtu(data: bytes) -> ParticleFrame:
     head, mark, rest = data.partition(MARK)
     if not mark:
         raise ValueError("its arrays are not appended as raw bytes; write it anew as ply or npz")
+    if b"<!" in head:  # entities could grow without bound
+        raise ValueError("it declares XML entities or has comments, which no particle file needs")
     root = ET.fromstring(head + b"</VTKFile>")
     if root.get("compressor") or root.get("header_type") != "UInt64" or root.get("byte_order") != "LittleEndian":
         raise ValueError("it is compressed or not little-endian with 64-bit headers; write it anew as ply or npz")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -16,26 +17,45 @@ else:
     import tomli as tomllib
 
 SUFFIXES = (".toml", ".json")
+LARGEST_FILE = 1 << 20
+"""Bytes that a scene file may have: what is longer belongs into a file of particles or a mesh."""
+NAME = r"^[\w()+-][\w .()+-]*$"
+"""What a scene may be called: a folder of results gets its name, so it holds no separators."""
 
 
 def read_scene_file(path: Path) -> dict[str, Any]:
     """Return the data of a TOML file, or of a JSON file that holds the same (`Scene.to_dict`) or a SPlisHSPlasH scene.
 
-    The scene is called like the file if it has no name. Raises `SceneError`.
+    The scene is called like the file if it has no name. Raises `SceneError` if it cannot be read, is none, or is longer than
+    `LARGEST_FILE`.
     """
     kind = path.suffix[1:].upper()
     try:
-        text = path.read_text(encoding="utf-8-sig")
-        data = tomllib.loads(text) if kind == "TOML" else json.loads(text)
-    except OSError as error:
-        raise SceneError(f"scene file {str(path)!r} cannot be read: {error.strerror}; check the path") from None
-    except (ValueError, RecursionError) as error:
-        raise SceneError(f"scene file {str(path)!r} is not valid {kind}: {error}") from None
+        with path.open("rb") as file:
+            text = file.read(LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:  # a zero byte in a path is no OSError
+        reason = getattr(error, "strerror", None) or error
+        raise SceneError(f"scene file {str(path)!r} cannot be read: {reason}; check the path") from None
+    if len(text) > LARGEST_FILE:
+        raise SceneError(
+            f"scene file {str(path)!r} is longer than {LARGEST_FILE} bytes; put particles and meshes into files of their own"
+        )
+    try:
+        decoded = text.decode("utf-8-sig")
+        data = tomllib.loads(decoded) if kind == "TOML" else json.loads(decoded)
+    except (ValueError, RecursionError) as error:  # whatever the text is that is none
+        raise SceneError(f"scene file {str(path)!r} is not valid {kind}: {error}; correct it") from None
     if not isinstance(data, dict):
         raise SceneError(f"scene file {str(path)!r} holds a {type(data).__name__}; a scene is a table of keys")
+    name = {"name": name_for(path)}
     if is_splishsplash(data):
-        return {"name": path.stem} | from_splishsplash(data, path)
-    return with_files_beside({"name": path.stem} | data, path)
+        return name | from_splishsplash(data, path)
+    return with_files_beside(name | data, path)
+
+
+def name_for(path: Path) -> str:
+    """Return the name of the scene in a file that gives it none."""
+    return re.sub(r"[^\w .()+-]", "_", path.stem)[:100].lstrip(" .") or "scene"
 
 
 def with_files_beside(data: dict[str, Any], path: Path) -> dict[str, Any]:
@@ -52,11 +72,36 @@ def with_files_beside(data: dict[str, Any], path: Path) -> dict[str, Any]:
         resolved[key] = []
         for k, part in enumerate(parts):
             if isinstance(part, dict) and isinstance(part.get("file"), str):
-                file = (folder / part["file"]).resolve()
-                if not file.is_relative_to(folder):
+                file = _resolved(folder, part["file"])
+                if file is None or not file.is_relative_to(folder):
                     raise SceneError(
                         f"{path}: {key}.{k}.file: {part['file']!r} leaves the scene's folder {str(folder)!r}; put it there"
                     )
                 part = part | {"file": str(file)}
             resolved[key].append(part)
     return data | resolved
+
+
+def require_files_near(data: dict[str, Any], path: Path, source: str) -> None:
+    """Raise `SceneError` if the scene in the checkpoint `path` names a file that lies neither here nor near the checkpoint.
+
+    Here is the present folder and all below it; near is all below the folder that the run's own lies in.
+    """
+    folders = (Path.cwd(), path.resolve().parent.parent.parent)
+    for key in ("fluids", "obstacles"):
+        for k, part in enumerate(data.get(key, ())):
+            if isinstance(part, dict) and isinstance(part.get("file"), str):
+                file = _resolved(Path.cwd(), part["file"])
+                if file is None or not any(file.is_relative_to(folder) for folder in folders):
+                    raise SceneError(
+                        f"{source}: {key}.{k}.file: {part['file']!r} is neither below {folders[0]} nor below {folders[1]}; "
+                        "if it is yours, go on in its folder"
+                    )
+
+
+def _resolved(folder: Path, file: str) -> Path | None:
+    """Return the path of `file` in `folder`, with links followed; None if there can be none of that name."""
+    try:
+        return (folder / file).resolve()
+    except (OSError, ValueError, RuntimeError):  # a zero byte, or links in a circle
+        return None

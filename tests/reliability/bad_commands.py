@@ -1,0 +1,148 @@
+"""Command lines with values that are none, options that contradict each other, and places that cannot be written to."""
+
+from typing import Any
+
+from rows import Row
+
+DAM = ("run", "dam_break_2d", "--arch", "cpu", "--output-dir", "out")
+
+
+def command(what: str, args: tuple[str, ...], *words: str, **more: Any) -> Row:
+    return Row("command line", what, args, words, **more)
+
+
+def options(*args: str) -> tuple[str, ...]:
+    return (*DAM, *args)
+
+
+NUMBERS = ("--courant", "--alpha", "--lambda-f", "--spacing", "--end-time", "--export-fps", "--checkpoint-every")
+BAD_NUMBERS = {
+    "wrong type": "many",
+    "NaN": "nan",
+    "infinite": "inf",
+    "negative": "-1",
+    "zero": "0",
+    "huge": "1e300",
+    "tiny": "1e-300",
+}
+VALID_OPTIONS = {("--checkpoint-every", "huge"), ("--export-fps", "tiny")}
+"""A checkpoint, or a frame, at the end only."""
+
+COMMANDS = [
+    *(
+        command(f"{option} {kind}", options("--stepper", "regional", option, value), option.strip("-").split("-")[0])
+        for option in NUMBERS
+        for kind, value in BAD_NUMBERS.items()
+        if (option, kind) not in VALID_OPTIONS
+    ),
+    *(
+        command(f"--sound-speed {kind}", options("--sound-speed", value), "sound")
+        for kind, value in BAD_NUMBERS.items()
+    ),
+    *(
+        command(f"{option} {value}", options(option, value), option.strip("-"))
+        for option in ("--azimuth", "--elevation")
+        for value in ("many", "nan", "inf", "1e300", "-400")
+    ),
+    *(
+        command(f"{option} {value}", options(option, value), "picture" if value[-1].isdigit() else option)
+        for option in ("--width", "--height")
+        for value in ("many", "nan", "0", "-5", "100000")
+    ),
+    *(
+        command(f"--levels {value}", options("--levels", value), "levels")
+        for value in ("0", "-1", "1.5", "many", "100000")
+    ),
+    *(
+        command(f"--particles {value}", options("--particles", value), value, "30k")
+        for value in ("many", "nan", "0", "-5", "1e12")
+    ),
+    command(
+        "more particles than memory",
+        options("--particles", "500M"),
+        "of memory",
+        "are free",
+        "use a spacing of at least",
+    ),
+    command("λ of 50", options("--courant", "50"), "courant", "less than or equal to 2", "50"),
+    command(
+        "levels of no power of two", options("--stepper", "asynchronous", "--levels", "6"), "levels 6", "use 4 or 8"
+    ),
+    command("--stagger -1", options("--stepper", "asynchronous", "--stagger", "-1"), "stagger"),
+    command("--stagger 1e10", options("--stepper", "asynchronous", "--stagger", "10000000000"), "stagger"),
+    command("option of another stepper", options("--stepper", "uniform", "--levels", "3"), "--levels", "uniform"),
+    command(
+        "panels and a stepper",
+        options("--panels", "steppers", "--stepper", "uniform"),
+        "--panels steppers",
+        "leave out",
+    ),
+    command("spacing and particles", options("--spacing", "0.1", "--particles", "1k"), "both given"),
+    command("spacing larger than a block", options("--spacing", "2"), "exceeds the shortest edge"),
+    command("end before a frame", options("--export-fps", "1e7"), "export_fps"),
+    command(
+        "too many frames", options("--end-time", "2", "--export-fps", "1e6"), "frames", "use an export_fps of at most"
+    ),
+    command("too many checkpoints", options("--checkpoint-every", "1e-9"), "checkpoints", "use at least"),
+    command("unknown scene", ("run", "no_such_scene"), "no_such_scene", "choose one of"),
+    command("missing scene file", ("run", "none.toml"), "none.toml", "check the path"),
+    command("scene file that is a folder", ("run", "folder.toml"), "folder.toml", "check the path"),
+    command("unknown extension", ("run", "scene.yaml"), "scene.yaml", "name a .toml file"),
+    command("unknown option", options("--nonsense"), "nonsense"),
+    command("unknown command", ("jump",), "jump"),
+    command("unknown stepper", options("--stepper", "leapfrog"), "leapfrog"),
+    command("unknown arch", options("--arch", "tpu"), "tpu"),
+    command("arch missing", ("run", "dam_break_2d", "--arch", "cuda", "--output-dir", "out"), "cuda", "use --arch cpu"),
+    command("unknown precision", options("--precision", "f16"), "f16"),
+    command("unknown colours", options("--colour-by", "age"), "age"),
+    command("unknown format", options("--export", "vtk"), "'vtk' is no format", "did you mean 'vtu'"),
+    command("unknown attribute", options("--export", "vtu", "--attributes", "mood"), "'mood' is no attribute"),
+    command("attributes of nothing", options("--attributes", "id"), "nothing is exported"),
+    command("surface in two dimensions", options("--export", "surface"), "3 dimensions", "leave it out"),
+    command("video without pictures", options("--no-frames", "--video"), "--no-frames", "leave out one"),
+    command("window and debug", options("--gui", "--debug"), "--gui", "leave out"),
+    command(
+        "output exists",
+        ("run", "dam_break_2d", "--arch", "cpu", "--output-dir", "earlier"),
+        "already holds a run",
+        "--overwrite",
+    ),
+    command(
+        "output is a file",
+        ("run", "dam_break_2d", "--arch", "cpu", "--output-dir", "drops.csv"),
+        "is a file",
+        "choose another",
+    ),
+    command(
+        "output below a file",
+        ("run", "dam_break_2d", "--arch", "cpu", "--output-dir", "drops.csv/out"),
+        "drops.csv",
+        "choose another",
+    ),
+    command(
+        "no write permission",
+        ("run", "dam_break_2d", "--arch", "cpu", "--output-dir", "/proc/out"),
+        "/proc/out",
+        "choose another",
+    ),
+    command("resume of nothing", ("run", "--resume", "none.npz"), "none.npz", "check the path"),
+    command("resume of another file", ("run", "--resume", "drops.csv"), "drops.csv", "use another checkpoint"),
+    command(
+        "resume of a folder without checkpoints",
+        ("run", "--resume", "earlier"),
+        "no whole checkpoint",
+        "start the run again",
+    ),
+    command("compare: no such stepper", ("compare", "--steppers", "leapfrog", "--output-dir", "out"), "leapfrog"),
+    command("compare: courants", ("compare", "--courants", "0.4,many", "--output-dir", "out"), "many"),
+    command("compare: courant NaN", ("compare", "--courants", "nan", "--output-dir", "out"), "nan"),
+    command("compare: 0 samples", ("compare", "--samples", "0", "--output-dir", "out"), "samples"),
+    command("compare: 0 repeats", ("compare", "--repeats", "0", "--output-dir", "out"), "repeats"),
+    command("compare: 0 workers", ("compare", "--workers", "0", "--output-dir", "out"), "workers"),
+    command("compare: end NaN", ("compare", "--end-time", "nan", "--output-dir", "out"), "end_time"),
+    command("compare: output is a file", ("compare", "--output-dir", "drops.csv"), "is a file", "choose another"),
+    command("stability: no such case", ("stability", "--cases", "calm", "--output-dir", "out"), "calm"),
+    command("stability: tolerance NaN", ("stability", "--tolerance", "nan", "--output-dir", "out"), "tolerance"),
+    command("stability: 0 workers", ("stability", "--workers", "0", "--output-dir", "out"), "workers"),
+    command("stability: output is a file", ("stability", "--output-dir", "drops.csv"), "is a file", "choose another"),
+]

@@ -1,0 +1,62 @@
+"""Every row of bad_fields, bad_scenes and bad_commands is refused as a whole.
+
+Exit code 2, one message with value, limit and remedy, within 2 s, and nothing on disk changes.
+"""
+
+import pytest
+from bad_commands import COMMANDS
+from bad_fields import field_rows
+from bad_scenes import SCENES
+from rows import prepare
+from scenes import FLAT, SOLID, to_toml
+from trial import attempt, fill
+
+import taichi_rts as rts
+from taichi_rts.output import recorder
+
+ARGS = ("run", "scene.toml", "--arch", "cpu", "--output-dir", "out")
+
+
+class StartedError(Exception):
+    """A run has begun that should not."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("outer") / "bad"
+    made.mkdir()
+    fill(made)
+    return made
+
+
+@pytest.fixture(autouse=True)
+def never_starts(monkeypatch, kernel_cache):
+    def start(*_args, **_options):
+        raise StartedError
+
+    monkeypatch.setattr(recorder, "Simulation", start)
+
+
+def test_the_whole_scenes_are_valid(folder):
+    for data, dim in ((SOLID, 3), (FLAT, 2)):
+        (folder / "scene.toml").write_text(to_toml(data))
+        assert rts.load_scene(folder / "scene.toml").dim == dim
+
+
+@pytest.mark.parametrize("row", field_rows(), ids=lambda row: row.name)
+def test_fields(row, folder):
+    found = {}
+    for kind, (data, valid) in row.scenes.items():
+        (folder / "scene.toml").write_text(to_toml(data))
+        if valid:
+            rts.load_scene(folder / "scene.toml")
+        elif faults := attempt(folder, *ARGS).faults():
+            found[kind] = faults
+    assert not found
+
+
+@pytest.mark.parametrize("row", [*SCENES, *COMMANDS], ids=lambda row: row.what)
+def test_rows(row, folder):
+    prepare(folder, row)
+    trial = attempt(folder, *row.args)
+    assert not trial.faults(row.words), trial.said
