@@ -19,7 +19,8 @@ from taichi_rts.particles import Neighbourhood
 from taichi_rts.physics.walls import make_wall_sum
 
 TASKS = 64  # windows, and shares of the blocks that threads take one by one
-RUN = 8  # most blocks that share a window
+CHUNK = 512  # iterations that Taichi gives to a thread at a time, whatever `block_dim` says: one of them does a task
+RUN = 16  # most blocks that share a window
 VECTOR = 16  # loops go on to a multiple of it; who lies there is too far away to count
 ROOM = 1.5  # of a window, over what lies around a run of blocks at rest
 FAR = 1e3  # distance over the support radius of those behind the last
@@ -213,9 +214,11 @@ class NeighbourSum:
                 k = due.due[n]
                 finish(k, self.plain(k), self.other_walls(k), due, now, tick)
         else:
-            for task in range(TASKS):
-                blocks = self.grid.geometry.blocks
+            for turn in range(TASKS * CHUNK):
+                task, blocks = turn // CHUNK, self.grid.geometry.blocks
                 block, end = self.share(task, blocks), self.share(task + 1, blocks)
+                if turn % CHUNK > 0:
+                    end = block
                 while block < end:
                     first, last = due.due_in(block)
                     if first < last:
