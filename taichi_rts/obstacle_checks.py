@@ -88,8 +88,9 @@ def _drowned_faults(scene: Scene, solids: list[tuple[int, Solid]]) -> list[str]:
             for a, b in zip(fluid.lower, fluid.upper, strict=True)
         ]
         for k, solid in solids:
-            near = ((solid.lower < fluid.upper) & (solid.upper > fluid.lower)).all()
-            if near and _lies_within(solid, 0.5 * scene.spacing, fluid, steps):
+            low, high = solid.lower - scene.spacing, solid.upper + scene.spacing
+            covered = (low <= fluid.lower).all() and (high >= fluid.upper).all()  # or some of it lies outside
+            if covered and _lies_within(solid, 0.5 * scene.spacing, fluid, steps):
                 faults.append(f"fluids.{n}: lies wholly inside obstacles.{k}; move or shrink one of them")
     return faults
 

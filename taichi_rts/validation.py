@@ -19,6 +19,7 @@ LARGEST = 1e12
 """Largest magnitude of a number in a scene or a stepper, in SI units: the square of a larger one soon leaves single precision."""
 LEAST = 1e-12
 """Least value of a number that has to be above 0."""
+MOST_SHOWN = 100  # characters of a value that a message repeats
 T = TypeVar("T", bound=type)
 
 
@@ -70,7 +71,8 @@ def describe(error: pydantic.ValidationError, subject: str, names: Iterable[str]
         elif item["type"] in ("missing", "missing_argument"):
             message = "missing; give it a value"
         elif item["type"] not in ("value_error", "assertion_error"):
-            message = f"{message} (got {item['input']!r})"
+            given = repr(item["input"])
+            message = f"{message} (got {given if len(given) <= MOST_SHOWN else given[: MOST_SHOWN - 3] + '...'})"
         lines.append(f"{path}: {message}" if path else message)
     return f"{subject}: " + "\n  ".join(lines)
 
