@@ -91,8 +91,8 @@ def _drowned_faults(scene: Scene, solids: list[tuple[int, Solid]]) -> list[str]:
 
 def is_drowned(fluid: Block | Sphere | Particles, solid: Solid, spacing: float) -> bool:
     """Whether a fluid lies wholly in a solid, or nearer to it than half of `spacing` [m]."""
-    if not ((solid.lower < fluid.upper) & (solid.upper > fluid.lower)).all():
-        return False
+    if (solid.lower - spacing > fluid.lower).any() or (solid.upper + spacing < fluid.upper).any():
+        return False  # some of it lies outside
     axes = [
         np.linspace(a, b, max(1, int((b - a) / spacing)) * 2 + 1)[1::2]
         for a, b in zip(fluid.lower, fluid.upper, strict=True)

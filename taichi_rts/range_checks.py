@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_rts.shapes import corners
+from taichi_rts.shapes import corners, top_speed
 
 if TYPE_CHECKING:
     from taichi_rts.scene import Scene
@@ -30,13 +30,14 @@ def range_faults(scene: Scene) -> list[str]:
     """Find what is out of range. Only to be asked of a scene in which nothing else is wrong."""
     if scene.spacing < FINEST:
         return [f"spacing: {scene.spacing:g} is below {FINEST:g} m, where single precision ends; use a larger one"]
-    speed, c, r = scene.estimate_max_speed(), scene.wave_speed, scene.support
+    c, r = scene.wave_speed, scene.support
     if not 0.0 < c * c / r <= STEEPEST:
         return [
             f"sound_speed: {c:.3g} m/s over a support radius of {r:g} m makes accelerations of {c * c / r:.3g} m/s^2, more than "
             f"the {STEEPEST:g} that single precision can square; lower speeds and heights, or use a larger spacing"
         ]
     faults = []
+    speed = _certain_speed(scene)
     if speed > MOST_MACH * c * (1 + 1e-9):
         faults.append(
             f"sound_speed: {c:g} m/s is too little for fluid that starts, falls or is pushed at up to {speed:.3g} m/s, at most "
@@ -66,6 +67,12 @@ def range_faults(scene: Scene) -> list[str]:
             f"{MOST_COMPRESSION:g}; use a sound_speed of at least {math.sqrt(scene.depth_potential / MOST_COMPRESSION):.3g}"
         )
     return faults
+
+
+def _certain_speed(scene: Scene) -> float:
+    """Largest speed [m/s] that the scene sets, or that fluid reaches by falling; on periodic axes friction may stop a fall."""
+    given = [top_speed(fluid) for fluid in scene.fluids] + [math.hypot(*inflow.velocity) for inflow in scene.inflows]
+    return max(scene.wall_speed, *given) if any(scene.is_periodic) else scene.estimate_max_speed()
 
 
 def _accelerations(scene: Scene) -> list[tuple[str, float]]:

@@ -56,7 +56,8 @@ def device_bytes(
     reals += 2 * moving
     integers += 1 + bool(scene.inflows)
     per_block = (
-        INTEGER * (2 * CELLS + (CELLS + 1) * (1 + moving) + BLOCK_INTEGERS[stepper.name])
+        INTEGER
+        * (2 * CELLS + (CELLS + 1) * (1 + moving) + BLOCK_INTEGERS.get(stepper.name, max(BLOCK_INTEGERS.values())))
         + real * SOUND_REALS * regional
     )
     nodes = sum(_nodes(scene, spacing))

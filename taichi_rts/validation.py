@@ -23,6 +23,7 @@ LEAST = 1e-12
 """Least value of a number that has to be above 0."""
 Colour = Annotated[str, AfterValidator(lambda name: _known_colour(name))]
 """A colour by its name in HTML or as "#RRGGBB"."""
+MOST_SHOWN = 100  # characters of a value that a message repeats
 T = TypeVar("T", bound=type)
 Keys = Callable[[Sequence[str | int]], list[str]]
 UNITS = {
@@ -108,7 +109,8 @@ def describe(error: pydantic.ValidationError, subject: str, names: Iterable[str]
         elif isinstance(item["input"], str) and (value := in_si(item["input"])) is not None:
             message = f"{item['input']!r} is a text; give a plain number in SI units, {value:.9g}"
         elif item["type"] not in ("value_error", "assertion_error"):
-            message = f"{message} (got {item['input']!r})"
+            given = repr(item["input"])
+            message = f"{message} (got {given if len(given) <= MOST_SHOWN else given[: MOST_SHOWN - 3] + '...'})"
         lines.append(f"{path}: {message}" if path else message)
     return f"{subject}: " + "\n  ".join(lines)
 

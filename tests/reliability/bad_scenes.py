@@ -2,9 +2,7 @@
 
 from typing import Any
 
-from rows import Row
-
-RUN = ("run", "scene.toml", "--arch", "cpu", "--output-dir", "out")
+from rows import RUN, Row
 
 
 def scene(what: str, data: Any, *words: str) -> Row:

@@ -6,6 +6,8 @@ from typing import Any
 
 from scenes import to_toml
 
+RUN = ("run", "scene.toml", "--arch", "cpu", "--output-dir", "out")
+
 
 @dataclass(frozen=True)
 class Row:

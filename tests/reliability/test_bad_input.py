@@ -7,14 +7,12 @@ import pytest
 from bad_commands import COMMANDS
 from bad_fields import field_rows
 from bad_scenes import SCENES
-from rows import prepare
+from rows import RUN, prepare
 from scenes import FLAT, SOLID, to_toml
 from trial import attempt, fill
 
 import taichi_rts as rts
 from taichi_rts.output import recorder
-
-ARGS = ("run", "scene.toml", "--arch", "cpu", "--output-dir", "out")
 
 
 class StartedError(Exception):
@@ -50,7 +48,7 @@ def test_fields(row, folder):
         (folder / "scene.toml").write_text(to_toml(data))
         if valid:
             rts.load_scene(folder / "scene.toml")
-        elif faults := attempt(folder, *ARGS).faults():
+        elif faults := attempt(folder, *RUN).faults():
             found[kind] = faults
     assert not found
 
