@@ -14,6 +14,7 @@ from taichi_rts.errors import ResourceError
 from taichi_rts.scene_size import CELLS, finest_spacing, size_of
 from taichi_rts.solids import grid_nodes, make_solid
 from taichi_rts.stepping.timeline import MAX_TICKS
+from taichi_rts.windows import TASKS, entries
 
 if TYPE_CHECKING:
     from taichi_rts.scene import Scene
@@ -31,6 +32,8 @@ BLOCK_INTEGERS = {"uniform": 1, "regional": 7, "asynchronous": 11}
 """Fields of 32-bit integers that each stepper has with an entry for each block."""
 FIXED = 1 << 17
 """Bytes of fields whose size does not depend on the scene, about."""
+WALL_SHARE = 0.45
+"""Entries of the windows on a wall at rest over those of the windows on the fluid, about."""
 SOUND_REALS = 10
 """Fields of reals with an entry for each block that a regional sound speed needs."""
 FINEST_POSITION = 0.01
@@ -38,7 +41,13 @@ FINEST_POSITION = 0.01
 
 
 def device_bytes(
-    scene: Scene, stepper: Any, precision: str, *, debug: bool = False, spacing: float | None = None
+    scene: Scene,
+    stepper: Any,
+    precision: str,
+    *,
+    debug: bool = False,
+    spacing: float | None = None,
+    on_cpu: bool = True,
 ) -> float:
     """Bytes of all fields of a `Simulation`: what its parts allocate for each particle, wall particle, cell and block."""
     size, dim, real = size_of(scene, spacing), scene.dim, 8 if precision == "f64" else 4
@@ -61,11 +70,15 @@ def device_bytes(
         + real * SOUND_REALS * regional
     )
     nodes = sum(_nodes(scene, spacing))
+    windows = TASKS * entries(dim, (scene.support_ratio * (1.0 + 2.0 * stepper.drift)) ** dim)
+    near = 2 * dim + 2 + (dim + 1) * integrated + (len(set(scene.viscosities)) > 1)
+    reals_seen = near + (WALL_SHARE * (2 * dim + 1) if scene.walls and not scene.periodic else 0.0)
     return (
         size.particles * (real * reals + INTEGER * integers)
         + (size.walls + _lining(scene, spacing)) * real * (2 * dim + 1)
         + size.blocks * per_block
         + nodes * real
+        + (windows * real * reals_seen if on_cpu else 0.0)
         + FIXED
     )
 
@@ -135,7 +148,10 @@ def require_memory(
     steppers = list(steppers)
 
     def needs(spacing: float | None) -> tuple[float, float]:
-        device = sum(device_bytes(scene, each, backend.precision, debug=debug, spacing=spacing) for each in steppers)
+        device = sum(
+            device_bytes(scene, each, backend.precision, debug=debug, spacing=spacing, on_cpu=backend.arch == "cpu")
+            for each in steppers
+        )
         return device + pictures, host_bytes(scene, spacing=spacing) + COMPILED
 
     host, device = free_host_memory(), free_device_memory(backend)

@@ -26,6 +26,11 @@ ROOM = 1.5  # of a window, over what lies around a run of blocks at rest
 FAR = 1e3  # distance over the support radius of those behind the last
 
 
+def entries(dim: int, per_block: float) -> int:
+    """Entries of a window on fluid of `per_block` particles a block."""
+    return math.ceil(ROOM * 3 ** (dim - 1) * (RUN + 2) * per_block) + VECTOR
+
+
 @ti.data_oriented
 class Windows:
     """`TASKS` windows on what `start` has sorted into cells; each has room for `capacity` entries."""
@@ -137,7 +142,7 @@ class FluidWindows(Windows):
 
     def __init__(self, near: Neighbourhood, grid: BlockGrid, per_block: float, backend: Backend, needs: Any) -> None:
         dim = grid.geometry.dim
-        super().__init__(grid.geometry, grid.start, math.ceil(ROOM * 3 ** (dim - 1) * (RUN + 2) * per_block))
+        super().__init__(grid.geometry, grid.start, entries(dim, per_block) - VECTOR)
         self.inside = Neighbourhood(
             self.entries, dim, backend, needs
         )  # whose positions are unrolled along periodic axes
