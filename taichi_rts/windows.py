@@ -171,6 +171,8 @@ class NeighbourSum:
     offered too, so they must vanish there by themselves.
     """
 
+    transient = frozenset({"dtype", "copies", "wall_copies"})
+
     def __init__(
         self,
         pair: Callable[..., Any],

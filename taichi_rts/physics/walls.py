@@ -31,7 +31,9 @@ class Walls:
     """
 
     moves = False
-    transient = frozenset({"x", "volume", "normal", "depth", "stiffness", "start", "near", "shift", "speed", "windows"})
+    transient = frozenset(
+        {"x", "volume", "normal", "depth", "stiffness", "start", "near", "shift", "speed", "windows", "dtype"}
+    )
 
     def __init__(self, layer: WallLayer, fluid: Neighbourhood, geometry: Geometry, backend: Backend) -> None:
         positions, volumes = layer.positions, layer.volumes

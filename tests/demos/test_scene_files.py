@@ -48,7 +48,13 @@ def test_an_example_runs(path, simulate):
 
 def test_examples_use_every_key_of_a_scene():
     used = {key for path in FILES for key in read_scene_file(path)}
-    assert set(rts.Scene.__dataclass_fields__) - used <= {"body_force", "support_ratio", "rest_density", "walls"} | {
+    assert set(rts.Scene.__dataclass_fields__) - used <= {
+        "body_force",
+        "support_ratio",
+        "rest_density",
+        "walls",
+        "outlets",
+    } | {
         "kinematic_viscosity"  # each fluid's own is used
     }
 

@@ -100,7 +100,7 @@ SCENES = [
         "has 3 components; the domain has 2",
     ),
     scene("unknown key", with_parts(TANK, spacin=1.0), "spacin: unknown key", "did you mean 'spacing'"),
-    scene("a number with a unit", with_parts(TANK, spacing="0.1 m"), "spacing", "valid number", "0.1 m"),
+    scene("a number with a unit", with_parts(TANK, spacing="0.1 m"), "spacing", "plain number", "0.1 m"),
     scene("a number in quotes", with_parts(TANK, spacing="0.1"), "spacing", "valid number"),
     scene("true for a number", with_parts(TANK, spacing=True), "spacing", "valid number"),
     scene(

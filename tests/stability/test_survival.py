@@ -80,7 +80,7 @@ class FrozenRun:
     """Looks like a `Simulation` of one particle that only gains energy; it may say that a wall did the work."""
 
     def __init__(self, scene, end):
-        self.scene, self.end, self.time, self.count = scene, end, 0.0, 1
+        self.scene, self.end, self.time, self.count, self.removed_count = scene, end, 0.0, 1, 0
         self.medium = SimpleNamespace(mass=1.0, sound_speed=1.0, rest_density=1000.0, support=0.2)
         self.runaways, self.gain, self.works, self.base_step = 0, 0.0, False, 0.01
 
@@ -116,7 +116,7 @@ def test_each_criterion_can_fail(taichi, monkeypatch):
     assert outcome.runaways == 0
 
     x = np.array([[0.5, 0.5], [1.2, 0.5], [0.5, -0.1]])
-    sim = SimpleNamespace(scene=scene, count=3, time=0.0)
+    sim = SimpleNamespace(scene=scene, count=3, removed_count=0, time=0.0)
     assert survival.lost_particles(sim, x, 4) == "1 of 4 particles gone"
     assert survival.lost_particles(sim, x, 3) == "2 particles outside the walls"
     assert survival.lost_particles(sim, x[:1], 1) == ""
@@ -146,5 +146,5 @@ def test_a_particle_behind_a_moving_wall_is_lost():
     block = rts.Block((0.4, 0), (1, 1))
     scene = rts.Scene(rts.Box((0, 0), (1, 1)), (block,), 0.1, moving_walls=(wall,), periodic=("y",), sound_speed=10.0)
     x = np.array([[0.1, 0.5], [0.2, 0.5], [0.5, 1.5]])
-    sim = SimpleNamespace(scene=scene, count=3, time=0.5)
+    sim = SimpleNamespace(scene=scene, count=3, removed_count=0, time=0.5)
     assert survival.lost_particles(sim, x, 3) == "1 particles outside the walls"

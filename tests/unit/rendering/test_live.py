@@ -45,12 +45,12 @@ def test_keys_pause_step_reset_colour_and_clip(session, tmp_path):
     before = session.view()
     assert len(before.positions) == 75
     seen = [session.mode]
-    for _ in range(7):
+    for _ in range(9):
         press(session, "c")
         assert np.isfinite(session.view().colours).all()
         seen.append(session.mode)
-    assert seen[0] == seen[7] == "level"
-    assert len(set(seen)) == 7
+    assert seen[0] == seen[9] == "level"
+    assert len(set(seen)) == 9
     press(session, "p")
     assert session.painter.options.palette == "paper"
     press(session, "x", "[", "[", "[", "[", "[")  # at 0.25: of five columns one is left

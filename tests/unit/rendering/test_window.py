@@ -104,7 +104,7 @@ def test_keys_and_mouse_in_a_real_window(screen, tmp_path, quick_environment):
         still = screen()
         time.sleep(0.5)
         np.testing.assert_array_equal(screen()[110:450, 400:570], still[110:450, 400:570])  # paused
-        for _ in range(6):  # level, step, lead, speed, density, sound, plain
+        for _ in range(8):  # level, step, lead, speed, density, sound, fluid, pressure, plain
             send("key", "c")
             time.sleep(0.3)
         wait_for(lambda: water(PLAIN) > 500)
