@@ -117,6 +117,8 @@ def unknown(sim):
     state, found, code = State(sim), [], ("function", "method", "Func", "MatrixType", "DataTypeCxx", "Kernel")
     for path, owner in state.owners.items():
         for name, value in owner.items():
+            if name in state._skipped[path]:  # said to be no state
+                continue
             values = value if isinstance(value, (list, tuple)) else [value]
             if isinstance(value, dict):
                 values = list(value.values())
