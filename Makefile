@@ -5,11 +5,11 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3.10 python3 p
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test lint types format clean
+.PHONY: help demo test test-slow lint types format clean
 
 help:
 	@echo "make demo    render the double dam break, coloured by region, into out/double_dam_break"
-	@echo "make test    run the tests"
+	@echo "make test    run the tests; make test-slow the long ones"
 	@echo "make lint types format clean"
 
 # One stamp for each set of packages: the demo needs no developer's tools.
@@ -30,7 +30,11 @@ demo: $(VENV)/.installed
 	$(BIN)/python demos/double_dam_break.py --overwrite
 
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -n auto --dist loadscope
+	$(BIN)/python -m pytest -n auto --dist loadscope -m "not slow"
+
+# What `test` leaves out to stay quick: whole scenes and commands, of which it runs small ones. The gate runs both.
+test-slow: $(VENV)/.installed-dev
+	$(BIN)/python -m pytest -n auto --dist loadscope -m slow
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .

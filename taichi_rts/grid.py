@@ -256,15 +256,20 @@ class BlockGrid:
 
 
 def make_neighbour_sum(
-    geometry: Geometry, start: ti.Field, pair: Callable[..., Any], width: int, backend: Backend
+    geometry: Geometry,
+    start: ti.Field,
+    pair: Callable[..., Any],
+    width: int,
+    backend: Backend,
+    lanes: int | None = None,
 ) -> Callable[..., Any]:
     """Return a ti.func `total(i, x, cell)`: the sum of `pair(i, j)`, a vector of `width`, over all j near `x` [m].
 
     `cell` is the one that `x` was sorted into. j runs over places of the sorted arrays that `start` indexes; pairs beyond the
     support are offered too, so `pair` must vanish there by itself. The inner loop has a constant length on the CPU
-    (`Backend.lanes`).
+    (`lanes`, by default `Backend.lanes`; with 1 it is a plain one, which is quicker to compile).
     """
-    lanes = backend.lanes
+    lanes = lanes or backend.lanes
     dtype = backend.dtype
     row_length = geometry.row_length
 

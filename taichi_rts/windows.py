@@ -206,7 +206,9 @@ class NeighbourSum:
         def pair_here(i, j):
             return pair(near, i, j)
 
-        self.plain_fluid = make_neighbour_sum(grid.geometry, grid.start, pair_here, width, backend)
+        self.plain_fluid = make_neighbour_sum(
+            grid.geometry, grid.start, pair_here, width, backend, lanes=1
+        )  # seldom used
         others = [wall for wall in walls if wall not in self.still]
         self.other_walls = make_wall_sum(others, grid, make_wall_pair, width, backend)
 

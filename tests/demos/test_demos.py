@@ -31,7 +31,13 @@ END = {"martin_moyce": 0.02, "elliptical_drop": 0.0082, "oscillating_drop": 0.5}
 SCENE = {"asynchronous_dam_break": "dam_break"}  # demos that show a scene of another name
 
 
-@pytest.mark.parametrize("demo", DEMOS, ids=lambda path: path.stem)
+QUICK = {"double_dam_break", "dam_break_2d", "asynchronous_dam_break", "projectile"}
+
+
+@pytest.mark.parametrize(
+    "demo",
+    [pytest.param(demo, id=demo.stem, marks=[] if demo.stem in QUICK else pytest.mark.slow) for demo in DEMOS],
+)
 def test_demo(demo, tmp_path):
     size = ["--spacing", str(COARSE.get(demo.stem, 0.1)), "--end-time", str(END.get(demo.stem, 0.1))]
     picture = ["--export-fps", "10", "--width", "256", "--height", "144", "--output-dir", str(tmp_path / "out")]

@@ -30,6 +30,7 @@ def test_an_example_comes_back_from_plain_data_and_from_json(path, tmp_path):
         assert rts.load_scene(tmp_path / "same.json") == scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_an_example_runs(path, simulate):
     scene = rts.load_scene(path, **({"spacing": COARSE[path.stem]} if path.stem in COARSE else {}))

@@ -27,7 +27,13 @@ STEPPERS = {
     "aligned": rts.Regional(levels=4, steps="powers_of_two"),
     "asynchronous": rts.Asynchronous(stagger=1),
 }
-each_stepper = pytest.mark.parametrize("stepper", STEPPERS.values(), ids=STEPPERS)
+each_stepper = pytest.mark.parametrize(
+    "stepper",
+    [
+        pytest.param(stepper, id=name, marks=[] if name == "regional" else pytest.mark.slow)
+        for name, stepper in STEPPERS.items()
+    ],
+)
 
 
 def drop(dim, **changes):
@@ -97,7 +103,7 @@ def test_as_much_flows_out_as_in(simulate, stepper):
     assert sim.outlets.energy == pytest.approx(0.5 * mass * SPEED**2 * removed, rel=0.05)
 
 
-@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("dim", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_only_what_comes_in_is_taken_out(simulate, dim, tmp_path):
     sim = simulate(drop(dim), rts.Regional())
     half, energy = sim.count // 2, sim.energy().total
@@ -120,6 +126,7 @@ def test_only_what_comes_in_is_taken_out(simulate, dim, tmp_path):
     np.testing.assert_allclose(rows["outlet_0"][[0, -1]], (0.0, half * sim.medium.mass), rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stepper", [STEPPERS["uniform"], STEPPERS["asynchronous"]], ids=["uniform", "asynchronous"])
 def test_an_emptied_domain_is_filled_again(simulate, stepper):
     rain = rts.Inflow((0.1, 1.0), (0.2, 1.0), (0, -2), start=0.5, stop=0.6)
@@ -133,6 +140,7 @@ def test_an_emptied_domain_is_filled_again(simulate, stepper):
     np.testing.assert_array_equal(sim.ids(), 16 + np.arange(8))
 
 
+@pytest.mark.slow
 def test_a_run_that_goes_on_has_the_same_bits(start_taichi, quick, tmp_path):
     path = tmp_path / "checkpoint.npz"
     with start_taichi("cpu", "f64", **quick):
@@ -149,7 +157,7 @@ def test_a_run_that_goes_on_has_the_same_bits(start_taichi, quick, tmp_path):
             np.testing.assert_array_equal(one, other)
 
 
-@pytest.mark.parametrize("sound", [20.0, "regional"])
+@pytest.mark.parametrize("sound", [pytest.param(20.0, marks=pytest.mark.slow), "regional"])
 def test_energy_taken_out_is_that_of_the_readers(simulate, sound):
     """Under gravity and pressure; readers sum it in NumPy."""
     dam = drop(2, fluids=[rts.Block((0, 0), (0.3, 0.9))], outlets=[rts.Outlet((0.3, 0), (1, 1))])

@@ -45,7 +45,12 @@ def stop_in_the_middle(sim, time):
 
 
 @pytest.mark.parametrize(  # all six: python tests/benchmarks/faults.py
-    ("name", "precision"), [("uniform", "f32"), ("regional", "f64"), ("asynchronous", "f32")]
+    ("name", "precision"),
+    [
+        pytest.param("uniform", "f32", marks=pytest.mark.slow),
+        pytest.param("regional", "f64", marks=pytest.mark.slow),
+        ("asynchronous", "f32"),
+    ],
 )
 def test_the_same_bits_as_without_a_stop(start_taichi, quick, tmp_path, name, precision):
     stepper = STEPPERS[name]

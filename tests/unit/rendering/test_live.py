@@ -90,6 +90,7 @@ def test_states_are_saved_and_loaded_and_a_run_may_take_them(session, tmp_path):
     assert session.sim.time == time  # and goes on
 
 
+@pytest.mark.slow
 def test_steppers_and_sliders_change_the_run_and_not_the_fluid(session):
     session.advance()
     press(session, "1")
@@ -225,6 +226,7 @@ class Gui:
     slider_float = slider_int
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["step", "lead"])
 def test_window_names_the_stepper_and_shows_every_mode(taichi_cpu_f64, monkeypatch, tmp_path, mode):
     monkeypatch.setattr(live, "LiveWindow", Window)

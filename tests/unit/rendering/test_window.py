@@ -80,6 +80,7 @@ def wait_for(condition, seconds=60.0):
     raise AssertionError("the window did not do it in time")
 
 
+@pytest.mark.slow
 def test_keys_and_mouse_in_a_real_window(screen, tmp_path, quick_environment):
     (tmp_path / "pool.toml").write_text(SCENE)
     command = [sys.executable, "-c", "from taichi_rts.cli import main; main()", "run", "pool.toml", "--gui"]
