@@ -12,6 +12,7 @@ import taichi as ti
 from taichi_rts.backend import has_vulkan_hardware
 from taichi_rts.errors import RenderError
 from taichi_rts.rendering import flat_kernels, lighting, shade_kernels, splat_kernels
+from taichi_rts.rendering.buffers import Buffer
 from taichi_rts.rendering.camera import Camera, box_corners, box_edges
 
 LINE_COLOUR = (0.16, 0.17, 0.20)
@@ -100,14 +101,14 @@ class Splatter:
         self._background = srgb_to_linear(background)
         self._fine = (width * supersample, height * supersample)
         samples, pixels = self._fine[0] * self._fine[1], width * height
-        self._depth, self._nearest, self._lines = (ti.ndarray(ti.i32, samples) for _ in range(3))
-        self._tiles = ti.ndarray(ti.i32, _tile_count(*self._fine))
-        self._shadow_depth = ti.ndarray(ti.i32, self.quality.shadow_size**2)
-        self._shadow_tiles = ti.ndarray(ti.i32, _tile_count(self.quality.shadow_size, self.quality.shadow_size))
+        self._depth, self._nearest, self._lines = (Buffer(ti.i32, samples) for _ in range(3))
+        self._tiles = Buffer(ti.i32, _tile_count(*self._fine))
+        self._shadow_depth = Buffer(ti.i32, self.quality.shadow_size**2)
+        self._shadow_tiles = Buffer(ti.i32, _tile_count(self.quality.shadow_size, self.quality.shadow_size))
         self._veil, self._smooth_veil = (ti.Vector.ndarray(3, ti.f32, pixels) for _ in range(2))
-        self._linear = ti.ndarray(ti.f32, 255 * 4 + 1)  # 8-bit colours fall on entries
+        self._linear = Buffer(ti.f32, 255 * 4 + 1)  # 8-bit colours fall on entries
         self._linear.from_numpy(srgb_to_linear(np.linspace(0, 1, 255 * 4 + 1)))
-        self._encode = ti.ndarray(ti.i32, 4096)  # entry k is linear light (k / 4095)^2
+        self._encode = Buffer(ti.i32, 4096)  # entry k is linear light (k / 4095)^2
         self._encode.from_numpy(np.rint(255 * linear_to_srgb(np.linspace(0, 1, 4096) ** 2)).astype(np.int32))
         pattern = shade_kernels.sampling_pattern(self.quality.pairs, self.quality.taps)
         self._pattern = ti.Vector.ndarray(3, ti.f32, max(len(pattern), 1))
