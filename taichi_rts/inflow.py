@@ -70,7 +70,7 @@ class Inflows:
                 guided_until = math.ceil((patch.crossing(layer) + patch.guidance) / tick)
                 first = particles.count
                 particles.grow(len(x))
-                dtype = np.float64 if particles.x.dtype == ti.f64 else np.float32
+                dtype = particles.numpy_dtype
                 potential = -x @ np.asarray(self.scene.acceleration_at(time)) - self.scene.floor_potential
                 self.energy += self.mass * float((0.5 * velocity @ velocity + potential).sum())
                 self.append(particles, first, now, guided_until, x.astype(dtype), velocity.astype(dtype))

@@ -8,9 +8,7 @@ from taichi_rts.motion import Motion
 from taichi_rts.scan import ExclusiveScan
 from taichi_rts.scene import Scene
 
-EVERY = (
-    4  # sorts of the grid between two looks, each of which the host waits for: fluid at Mach 0.1 moves 0.16 r meanwhile
-)
+EVERY = 4  # sorts between two looks, each of which the host waits for: fluid at Mach 0.1 moves 0.16 r meanwhile
 
 
 @ti.data_oriented
@@ -53,7 +51,7 @@ class Outlets:
     def take_out(self, count: int, now: int, tick: float) -> None:
         """Take out the `count` particles that `find` has found."""
         particles, dim = self.particles, self.particles.dim
-        dtype = np.float64 if particles.x.dtype == ti.f64 else np.float32
+        dtype = particles.numpy_dtype
         states = np.zeros((count, dim + 3), dtype)  # outlet, position [m], energies without potential and work [J/kg]
         self.scan.run()
         self.line_up(particles.count - count, states, now, tick)

@@ -110,6 +110,11 @@ class Particles:
         self.rho.from_numpy(np.pad(densities, unborn[0], constant_values=rest_density).astype(backend.numpy_dtype))
         self.identity.from_numpy(np.arange(self.capacity, dtype=np.int32))
 
+    @property
+    def numpy_dtype(self) -> Any:
+        """NumPy's type of the real numbers."""
+        return np.float64 if self.x.dtype == ti.f64 else np.float32
+
     def to_numpy(self, field: ti.Field) -> np.ndarray:
         """Values of one of the fields in order of particle id, (N,) or (N, dim)."""
         values, identity = field.to_numpy()[: self.count], self.identity.to_numpy()[: self.count]

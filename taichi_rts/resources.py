@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from taichi_rts.backend import Backend, has_vulkan_hardware
 from taichi_rts.errors import ResourceError
-from taichi_rts.scene_size import CELLS, finest_spacing, size_of
+from taichi_rts.grid import CELLS_PER_BLOCK
+from taichi_rts.scene_size import finest_spacing, size_of
 from taichi_rts.solids import grid_nodes, make_solid
 from taichi_rts.stepping.timeline import MAX_TICKS
-from taichi_rts.windows import TASKS, entries
+from taichi_rts.windows import TASKS, VECTOR, room
 
 if TYPE_CHECKING:
     from taichi_rts.scene import Scene
@@ -66,11 +67,15 @@ def device_bytes(
     integers += 1 + bool(scene.inflows)
     per_block = (
         INTEGER
-        * (2 * CELLS + (CELLS + 1) * (1 + moving) + BLOCK_INTEGERS.get(stepper.name, max(BLOCK_INTEGERS.values())))
+        * (
+            2 * CELLS_PER_BLOCK
+            + (CELLS_PER_BLOCK + 1) * (1 + moving)
+            + BLOCK_INTEGERS.get(stepper.name, max(BLOCK_INTEGERS.values()))
+        )
         + real * SOUND_REALS * regional
     )
     nodes = sum(_nodes(scene, spacing))
-    windows = TASKS * entries(dim, (scene.support_ratio * (1.0 + 2.0 * stepper.drift)) ** dim)
+    windows = TASKS * (VECTOR + room(dim, (scene.support_ratio * (1.0 + 2.0 * stepper.drift)) ** dim))
     near = 2 * dim + 2 + (dim + 1) * integrated + (len(set(scene.viscosities)) > 1)
     reals_seen = near + (WALL_SHARE * (2 * dim + 1) if scene.walls and not scene.periodic else 0.0)
     return (

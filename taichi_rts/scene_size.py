@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from taichi_rts.grid import CELLS_PER_BLOCK
 from taichi_rts.particle_fluid import Particles
 
 if TYPE_CHECKING:
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
 MOST = 2**31 - 1
 """Particles and cells of the grid are counted with 32 bits on the device."""
 MARGIN = 4.0  # blocks that the grid has more along an axis than fit into the domain, at most
-CELLS = 2  # of a block
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def size_faults(scene: Scene) -> list[str]:
         return {
             "fluid particles": size.particles,
             "wall particles": size.walls,
-            "cells of the grid": CELLS * size.blocks,
+            "cells of the grid": CELLS_PER_BLOCK * size.blocks,
         }
 
     found = counts(scene.spacing)

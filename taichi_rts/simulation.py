@@ -361,7 +361,8 @@ class Simulation:
 
     def fluids(self) -> np.ndarray:
         """Place of each particle's fluid in the scene, (N,), len(fluids) for what has flowed in. In order of particle id."""
-        return np.pad(self._fluids, (0, self.count - len(self._fluids)), constant_values=len(self.scene.fluids))
+        unborn = self.particles.born - len(self._fluids)
+        return np.pad(self._fluids, (0, unborn), constant_values=len(self.scene.fluids))[self.ids()]
 
     def steps(self) -> np.ndarray:
         """Steps [s], (N,): level times base step (`Uniform(adaptive=True)`: at most). In order of particle id."""

@@ -26,9 +26,9 @@ ROOM = 1.5  # of a window, over what lies around a run of blocks at rest
 FAR = 1e3  # distance over the support radius of those behind the last
 
 
-def entries(dim: int, per_block: float) -> int:
-    """Entries of a window on fluid of `per_block` particles a block."""
-    return math.ceil(ROOM * 3 ** (dim - 1) * (RUN + 2) * per_block) + VECTOR
+def room(dim: int, per_block: float) -> int:
+    """Particles that a window has room for, on fluid of `per_block` particles a block."""
+    return math.ceil(ROOM * 3 ** (dim - 1) * (RUN + 2) * per_block)
 
 
 @ti.data_oriented
@@ -142,10 +142,9 @@ class FluidWindows(Windows):
 
     def __init__(self, near: Neighbourhood, grid: BlockGrid, per_block: float, backend: Backend, needs: Any) -> None:
         dim = grid.geometry.dim
-        super().__init__(grid.geometry, grid.start, entries(dim, per_block) - VECTOR)
-        self.inside = Neighbourhood(
-            self.entries, dim, backend, needs
-        )  # whose positions are unrolled along periodic axes
+        super().__init__(grid.geometry, grid.start, room(dim, per_block))
+        self.inside = Neighbourhood(self.entries, dim, backend, needs)
+        """Its positions are unrolled along periodic axes."""
 
 
 class WallWindows(Windows):
@@ -192,25 +191,25 @@ class NeighbourSum:
         self.pair = pair
         self.dtype = backend.dtype
         self.by_windows = windows is not None
-        self.still = [wall for wall in walls if wall.windows is not None]
-        """The wall at rest, if it has windows."""
+        self.wall: Any = next((wall for wall in walls if wall.windows is not None), None)
+        """The wall at rest, of which there is one at most, if it has windows."""
+        self.has_wall = self.wall is not None
         if windows is not None:
             self.windows = windows
             self.copies = windows.copies(names, near, windows.inside)
-        for wall in self.still:
-            self.wall = wall
-            self.wall_copies = wall.windows.copies(wall_names, wall, wall.windows.inside)
-            self.wall_pair = make_wall_pair(wall.windows.inside)
+        if self.has_wall:
+            self.wall_copies = self.wall.windows.copies(wall_names, self.wall, self.wall.windows.inside)
+            self.wall_pair = make_wall_pair(self.wall.windows.inside)
 
         @ti.func
         def pair_here(i, j):
             return pair(near, i, j)
 
-        self.plain_fluid = make_neighbour_sum(
-            grid.geometry, grid.start, pair_here, width, backend, lanes=1
-        )  # seldom used
-        others = [wall for wall in walls if wall not in self.still]
-        self.other_walls = make_wall_sum(others, grid, make_wall_pair, width, backend)
+        lanes = None if windows is None else 1  # beside windows it is seldom used
+        self.plain_fluid = make_neighbour_sum(grid.geometry, grid.start, pair_here, width, backend, lanes)
+        self.other_walls = make_wall_sum(
+            [wall for wall in walls if wall is not self.wall], grid, make_wall_pair, width, backend
+        )
 
     @ti.func
     def visit(self, finish: ti.template(), due: ti.template(), now, tick):
@@ -270,7 +269,7 @@ class NeighbourSum:
                 else:  # a run that has blown up: too many in too little space
                     fluid = self.plain(k)
                 walls = self.other_walls(k)
-                if ti.static(len(self.still) > 0):
+                if ti.static(self.has_wall):
                     if self.wall.near[block + ahead] == 1:
                         low, high = self.wall.windows.near(local)
                         for b in range(low, high):
@@ -299,7 +298,7 @@ class NeighbourSum:
             if fits:
                 fits = n - base + self.windows.count(row, column - 1 + held) <= self.windows.capacity
         self.windows.close(self.copies, number + held * CELLS_PER_BLOCK, n)
-        if ti.static(len(self.still) > 0):
+        if ti.static(self.has_wall):
             some = 0
             for ahead in range(ti.max(held - 2, 1)):
                 some += self.wall.near[row * self.grid.geometry.shape[0] + column + ahead]

@@ -1,8 +1,8 @@
 """`python -m taichi_rts.benchmarks`."""
 
+import sys
+
 from taichi_rts.cli import main
 
 if __name__ == "__main__":
-    import sys
-
     main(["bench", *sys.argv[1:]])

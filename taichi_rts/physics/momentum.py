@@ -107,55 +107,54 @@ class MomentumEquation:
         sideways = [term for term in viscosities if term.along == "v"]
 
         @ti.func
-        def rates(along_x, along_v, x_ij, v_ij, d2, rho):
-            """Rates per unit of mass, but for a diffusion's, which is 0 here; `rho` is rho_i + rho_j."""
+        def rates(pushed, along_x, along_v, spread, x_ij, v_ij, d2, rho):
+            """Rates per unit of mass from the coefficients of pressure, viscosities and diffusion; `rho` is rho_i + rho_j."""
             d = ti.sqrt(d2 + tiny)
-            factor = 0.0
+            thick, factor = 1.0, 0.0
             if ti.static(len(viscosities) > 0):
-                factor = kernel.derivative(d) / (d * rho * (d2 + regular))
+                thick = rho * (d2 + regular)
+                factor = kernel.derivative(d) / (d * thick)
             else:
                 factor = kernel.gradient_factor(d)
             result = ti.Vector.zero(backend.dtype, width)
             for e in ti.static(range(dim)):
-                result[e] = factor * along_x * x_ij[e]
+                result[e] = factor * (thick * pushed + along_x) * x_ij[e]
                 if ti.static(len(sideways) > 0):
                     result[e] += factor * along_v * v_ij[e]
             if ti.static(width > dim):
-                result[dim] = kernel.gradient_factor(d) * v_ij.dot(x_ij)
+                result[dim] = factor * thick * v_ij.dot(x_ij)
+            if ti.static(diffuses):
+                result[width - 1] = factor * thick * spread
             return result
 
         @ti.func
         def fluid_pair(near, i, j):
             x_ij, v_ij = near.difference(i, j), near.v[i] - near.v[j]
             d2 = x_ij.norm_sqr()
-            rho = near.rho[i] + near.rho[j]
-            along_x, along_v = pressure.fluid_pair(near, i, j, x_ij, v_ij, d2), 0.0
-            if ti.static(len(viscosities) > 0):
-                along_x *= rho * (d2 + regular)
+            along_x, along_v, spread = 0.0, 0.0, 0.0
             for term in ti.static(straight):
                 along_x += term.fluid_pair(near, i, j, x_ij, v_ij, d2)
             for term in ti.static(sideways):
                 along_v += term.fluid_pair(near, i, j, x_ij, v_ij, d2)
-            result = rates(along_x, along_v, x_ij, v_ij, d2, rho)
             if ti.static(diffuses):
-                spread = kernel.gradient_factor(ti.sqrt(d2 + tiny))
-                result[width - 1] = spread * diffusion.fluid_pair(near, i, j, x_ij, d2)
-            return mass * result
+                spread = diffusion.fluid_pair(near, i, j, x_ij, d2)
+            pushed = pressure.fluid_pair(near, i, j, x_ij, v_ij, d2)
+            return mass * rates(pushed, along_x, along_v, spread, x_ij, v_ij, d2, near.rho[i] + near.rho[j])
 
         @ti.func
         def push(i, b, wall: ti.template()):
             """Rates due to a wall particle, as those of a fluid particle of the same density."""
             x_ib, v_ib = wall.difference(i, b), wall.relative_velocity(i, b)
             d2 = x_ib.norm_sqr()
-            rho = 2.0 * near.rho[i]
-            along_x, along_v = pressure.wall_pair(i, b, x_ib, v_ib, d2, wall), 0.0
-            if ti.static(len(viscosities) > 0):
-                along_x *= rho * (d2 + regular)
+            along_x, along_v = 0.0, 0.0
             for term in ti.static(straight):
                 along_x += term.wall_pair(i, b, x_ib, v_ib, d2, wall)
             for term in ti.static(sideways):
                 along_v += term.wall_pair(i, b, x_ib, v_ib, d2, wall)
-            return rest_density * wall.volume[b] * rates(along_x, along_v, x_ib, v_ib, d2, rho)
+            pushed = pressure.wall_pair(i, b, x_ib, v_ib, d2, wall)
+            return (
+                rest_density * wall.volume[b] * rates(pushed, along_x, along_v, 0.0, x_ib, v_ib, d2, 2.0 * near.rho[i])
+            )
 
         def wall_pair(wall: Any) -> Any:
             @ti.func

@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import imageio.v3 as imageio
-
 from taichi_rts.errors import OutputError
-from taichi_rts.output.files import write_bytes
+from taichi_rts.output.files import write_png
 from taichi_rts.output.video import Video, require_video
 from taichi_rts.rendering import legend
 from taichi_rts.rendering.camera import Camera
@@ -52,7 +50,7 @@ class Film:
         """Write the next picture; raises `OutputError`."""
         image = self.renderer.draw(view.positions, view.colours, view.radius, camera, outline)
         image = legend.draw_legend(image, "", entries, lines)
-        write_bytes(self.folder / f"{self.count:06d}.png", imageio.imwrite("<bytes>", image, extension=".png"))
+        write_png(self.folder / f"{self.count:06d}.png", image)
         if self.video:
             self.video.append(image)
         self.count += 1

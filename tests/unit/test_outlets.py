@@ -99,6 +99,7 @@ def test_as_much_flows_out_as_in(simulate, stepper):
     assert len(np.unique(ids)) == sim.count
     assert ids.max() < start + entered
     assert ids.min() > 0.9 * removed  # first in, first out
+    np.testing.assert_array_equal(sim.fluids(), ids >= start)
     assert sim.energy().total - sim.work() == pytest.approx(energy, abs=0.01 * sim.outlets.energy)
     assert sim.outlets.energy == pytest.approx(0.5 * mass * SPEED**2 * removed, rel=0.05)
 
