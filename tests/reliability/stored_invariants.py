@@ -19,6 +19,8 @@ SAMPLES = 5
 BASE_STEPS = 150
 """Base steps of `Uniform`: short enough that rounding, which grows from step to step, stays far below the tolerances."""
 FLAT_PARTICLES, SOLID_PARTICLES = 400, 800
+SPACINGS = {"water_jet": 0.1}
+"""Where fewer particles would be coarser than an inflow."""
 
 TOLERANCE = 0.01
 """Of what a quantity changes within the run. Forces that are 5 % too large change each scene by more
@@ -29,16 +31,17 @@ ROUNDING = 1e-6
 """Over the largest value that a quantity has, for what hardly changes."""
 
 
-def names(dim=None):
-    """Names of the scenes, of those in `dim` dimensions only."""
-    every = [name for name in rts.scene_names() if name not in SAME]
-    return [name for name in every if dim in (None, rts.load_scene(name).dim)]
+def names():
+    """Names of the scenes."""
+    return [name for name in rts.scene_names() if name not in SAME]
 
 
 def small(name):
     """Return a scene with few particles."""
-    scene = rts.load_scene(name, particles=FLAT_PARTICLES)
-    return scene if scene.dim == 2 else rts.load_scene(name, particles=SOLID_PARTICLES)
+    if name in SPACINGS:
+        return rts.load_scene(name, spacing=SPACINGS[name])
+    particles = FLAT_PARTICLES if rts.load_scene(name).dim == 2 else SOLID_PARTICLES
+    return rts.load_scene(name, particles=particles)
 
 
 def measure(scene, stepper):
