@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import time as clock
@@ -237,15 +238,28 @@ class Simulation:
         """Run to physical time `until` [s] and call `on_frame`, one or several, with the simulation at each frame; return it.
 
         Frames are those of a recording with `fps` frames a second: at the start, at all multiples of 1/fps after the present
-        time, and at `until`. Raises as `advance_to` does, and `OutputError` for an impossible `fps`.
+        time, and at `until`. Raises as `advance_to` does, as `check` at every frame, and `OutputError` for an impossible `fps`.
         """
         looks = [on_frame] if callable(on_frame) else on_frame or []
         for time in frame_times(until, fps):
             if time > self._time or time == 0.0 == self._time:
-                self.advance_to(time)
+                with contextlib.suppress(SimulationDivergedError):  # `check` says more
+                    self.advance_to(time)
+                self.check()
                 for look in looks:
                     look(self)
         return self
+
+    def check(self) -> None:
+        """Raise `SimulationDivergedError` with a diagnosis if the run has blown up, as a recording does at every frame.
+
+        That is: a state is not finite, speeds or accelerations had to be limited, or a density is not between 0.02 and 2 of
+        rest. It reads the state, so it is for once in a while; `advance_to` itself notices only what is not finite.
+        """
+        from taichi_rts.stability.diagnosis import diagnose  # only here, as it reads simulations
+
+        if (found := diagnose(self)) is not None:
+            raise SimulationDivergedError(f"blown up: {found}")
 
     def show(self, **options: Any) -> Image.Image:
         """Return a picture of the present state, which a notebook shows; `options` are those of `PictureOptions`."""

@@ -142,6 +142,13 @@ class Recorder:
         ]
 
     def _take_up(self, checkpoint: Checkpoint) -> None:
+        frames = checkpoint.time * self.recording.fps
+        if (
+            "frames" in checkpoint.extra
+        ):  # if the run had ended between two frames, the last is that of another time now
+            self.frames_done = min(checkpoint.extra["frames"], math.floor(frames * (1 + 1e-9)) + 1)
+        else:  # it was saved by a script
+            self.frames_done = math.ceil(frames * (1 - 1e-9))
         scenes = [scene.replace(end_time=self.scene.end_time) for scene in checkpoint.scenes]
         self.runs = {
             stepper: checkpoint.simulation(number, scene)
@@ -150,13 +157,6 @@ class Recorder:
         kept = checkpoint.extra.get("initial_energy")
         energies = [Energy(*each) for each in kept] if kept else [sim.energy() for sim in self.runs.values()]
         self.initial_energy = dict(zip(self.runs, energies, strict=True))
-        frames = checkpoint.time * self.recording.fps
-        if (
-            "frames" in checkpoint.extra
-        ):  # if the run had ended between two frames, the last is that of another time now
-            self.frames_done = min(checkpoint.extra["frames"], math.floor(frames * (1 + 1e-9)) + 1)
-        else:  # it was saved by a script
-            self.frames_done = math.ceil(frames * (1 - 1e-9))
         here = output_folder(checkpoint.archive.path) or Path()
         if here.resolve() == self.recording.folder.resolve():
             missing = [n for n in range(self.frames_done) if not self.frame_path(n).exists()]

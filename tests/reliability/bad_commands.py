@@ -2,9 +2,13 @@
 
 from typing import Any
 
-from rows import Row
+from rows import RUN, Row
+from scenes import SOLID, changed
 
 DAM = ("run", "dam_break_2d", "--arch", "cpu", "--output-dir", "out")
+
+NEW_MESH = changed(SOLID, ("obstacles", 3, "scale"), 0.37)
+"""A scene with a mesh that no other row has read, or it would be known still."""
 
 
 def command(what: str, args: tuple[str, ...], *words: str, **more: Any) -> Row:
@@ -13,6 +17,12 @@ def command(what: str, args: tuple[str, ...], *words: str, **more: Any) -> Row:
 
 def options(*args: str) -> tuple[str, ...]:
     return (*DAM, *args)
+
+
+def missing(package: str, extra: str, args: tuple[str, ...], **more: Any) -> Row:
+    """A command that needs a package which is not installed."""
+    words = (package.replace("_", "-"), f"pip install 'taichi_rts[{extra}]'")
+    return command(f"{package} not installed: {args[0]} {args[-1]}", args, *words, hidden=package, **more)
 
 
 NUMBERS = ("--courant", "--alpha", "--lambda-f", "--spacing", "--end-time", "--export-fps", "--checkpoint-every")
@@ -145,4 +155,14 @@ COMMANDS = [
     command("stability: tolerance NaN", ("stability", "--tolerance", "nan", "--output-dir", "out"), "tolerance"),
     command("stability: 0 workers", ("stability", "--workers", "0", "--output-dir", "out"), "workers"),
     command("stability: output is a file", ("stability", "--output-dir", "drops.csv"), "is a file", "choose another"),
+    missing("imageio_ffmpeg", "video", options("--video")),
+    missing("h5py", "hdf", options("--export", "vtkhdf")),
+    missing(
+        "pysplashsurf", "surface", ("run", "dam_break", "--arch", "cpu", "--output-dir", "out", "--export", "surface")
+    ),
+    missing("trimesh", "mesh", RUN, scene=NEW_MESH),
+    missing("scipy", "mesh", RUN, scene=NEW_MESH),
+    missing("matplotlib", "plots", ("compare", "--output-dir", "out")),
+    missing("matplotlib", "plots", ("stability", "--output-dir", "out")),
+    missing("distributed", "cluster", ("compare", "--output-dir", "out", "--no-plot", "--dask", "local")),
 ]

@@ -13,7 +13,7 @@ RUN = ("run", "scene.toml", "--arch", "cpu", "--output-dir", "out")
 class Row:
     """A command that has to be refused, what its message says, and what is in the folder that it is given in.
 
-    `scene` is written to scene.toml; what else there is `trial.fill` puts there.
+    `scene` is written to scene.toml; what else there is `trial.fill` puts there. `hidden` is a package that is not installed.
     """
 
     area: str
@@ -21,6 +21,7 @@ class Row:
     args: tuple[str, ...]
     words: tuple[str, ...]
     scene: dict[str, Any] | str | bytes | None = None
+    hidden: str | None = None
 
 
 def prepare(folder: Path, row: Row) -> None:

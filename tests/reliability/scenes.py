@@ -111,7 +111,89 @@ FLAT: dict[str, Any] = {
 }
 """One in two dimensions, with what three have not."""
 
-FILES = {"drops.csv": PARTICLES, "solid.obj": TETRAHEDRON, "open.obj": OPEN, "inside_out.obj": INSIDE_OUT}
+FOREIGN: dict[str, Any] = {
+    "Configuration": {
+        "particleRadius": 0.05,
+        "gravitation": [0.0, -9.81, 0.0],
+        "sim2D": False,
+        "stopAt": 1.5,
+        "pauseAt": -1.0,
+        "timeStepSize": 0.002,
+        "cflMethod": 1,
+        "cflFactor": 0.5,
+        "cflMaxTimeStepSize": 0.005,
+        "simulationMethod": 0,
+        "kernel": 1,
+        "cameraPosition": [0.0, 2.0, 5.0],
+        "cameraLookat": [0.0, 0.5, 0.0],
+    },
+    "Materials": [
+        {"id": "Fluid", "density0": 1000.0, "viscosity": 0.01, "viscosityMethod": 1, "surfaceTensionMethod": 0},
+        {"id": "oil", "density0": 1000.0, "viscosityMethod": 6, "Weiler et al. 2018": {"viscosity": 0.1}},
+    ],
+    "RigidBodies": [
+        {
+            "id": 1,
+            "geometryFile": "cube.obj",
+            "translation": [0.0, 1.0, 0.0],
+            "rotationAxis": [0.0, 1.0, 0.0],
+            "rotationAngle": 0.0,
+            "scale": [2.0, 2.0, 1.0],
+            "isWall": True,
+            "mapInvert": True,
+        },
+        {
+            "geometryFile": "solid.obj",
+            "translation": [0.4, 0.1, 0.0],
+            "rotationAxis": [0.0, 1.0, 0.0],
+            "rotationAngle": 0.5,
+            "scale": [0.3, 0.3, 0.3],
+            "isDynamic": False,
+            "isAnimated": False,
+            "isWall": False,
+        },
+    ],
+    "FluidBlocks": [
+        {
+            "id": "Fluid",
+            "start": [-0.5, 0.0, -0.5],
+            "end": [0.5, 1.0, 0.5],
+            "translation": [-0.5, 0.0, 0.0],
+            "scale": [0.8, 1.0, 1.0],
+            "denseMode": 0,
+            "initialVelocity": [0.1, 0.0, 0.0],
+            "initialAngularVelocity": [0.0, 0.0, 0.1],
+        }
+    ],
+    "FluidModels": [
+        {"id": "oil", "particleFile": "drops.csv", "translation": [-1.2, 1.0, -0.3], "initialVelocity": [0.0, 0.0, 0.0]}
+    ],
+    "Emitters": [
+        {
+            "width": 3,
+            "height": 3,
+            "translation": [-0.9, 1.6, 0.0],
+            "rotationAxis": [0.0, 1.0, 0.0],
+            "rotationAngle": 0.0,
+            "velocity": 1.0,
+            "type": 0,
+            "emitStartTime": 0.1,
+            "emitEndTime": 0.5,
+        }
+    ],
+}
+"""One of SPlisHSPlasH, with all that is read of its format."""
+
+CUBE = "".join(f"v {x} {y} {z}\n" for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)) + (
+    "f 1 2 4\nf 1 4 3\nf 5 7 8\nf 5 8 6\nf 1 5 6\nf 1 6 2\nf 3 4 8\nf 3 8 7\nf 1 3 7\nf 1 7 5\nf 2 6 8\nf 2 8 4\n"
+)
+FILES = {
+    "cube.obj": CUBE,
+    "drops.csv": PARTICLES,
+    "solid.obj": TETRAHEDRON,
+    "open.obj": OPEN,
+    "inside_out.obj": INSIDE_OUT,
+}
 
 Path = tuple[str | int, ...]
 """Keys and numbers that lead to a value of a scene."""

@@ -9,22 +9,15 @@ from bad_fields import field_rows
 from bad_scenes import SCENES
 from rows import RUN, prepare
 from scenes import FLAT, SOLID, to_toml
-from trial import attempt, fill
+from trial import attempt, without
 
 import taichi_rts as rts
 from taichi_rts.output import recorder
+from taichi_rts.rendering.x_keys import XKeys
 
 
 class StartedError(Exception):
     """A run has begun that should not."""
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("outer") / "bad"
-    made.mkdir()
-    fill(made)
-    return made
 
 
 @pytest.fixture(autouse=True)
@@ -56,5 +49,13 @@ def test_fields(row, folder):
 @pytest.mark.parametrize("row", [*SCENES, *COMMANDS], ids=lambda row: row.what)
 def test_rows(row, folder):
     prepare(folder, row)
-    trial = attempt(folder, *row.args)
+    with without(row.hidden):
+        trial = attempt(folder, *row.args)
     assert not trial.faults(row.words), trial.said
+
+
+def test_a_window_without_python_xlib_lacks_only_keys():
+    with without("Xlib"):
+        keys = XKeys("none")
+        assert keys.display is None
+        assert keys.pressed() == []

@@ -88,5 +88,21 @@ def test_a_number_that_is_none(tmp_path, start_taichi, quick):
         assert diagnose(other) is None
         other.particles.rho[3] = 2.5 * scene.rest_density
         assert "density 2.5 of rest is not between 0.02 and 2" in diagnose(other).exceeded
+        with pytest.raises(
+            rts.SimulationDivergedError, match=r"at t = 0 s particle 3 .* density 2\.5 of rest is not between"
+        ):
+            other.check()
         with pytest.raises(rts.SimulationDivergedError, match="blown up"):
             guard.look()
+
+
+def test_a_script_is_told_at_the_frame(start_taichi, quick):
+    """Speeds that are limited stay finite, so `advance_to` goes on; `run` ends at the first frame that has some."""
+    scene, frames = rts.load_scene("dam_break_2d", spacing=0.1), []
+    with start_taichi("cpu", "f64", **quick):
+        sim = rts.Simulation(scene, rts.Uniform(courant=2.0))
+        with pytest.raises(rts.SimulationDivergedError, match=r"blown up: at t = .* Remedy: a smaller courant"):
+            sim.run(1.0, lambda sim: frames.append(sim.time), fps=40)
+        assert sim.statistics["runaways"] > 0
+        assert frames == [number / 40 for number in range(len(frames))]
+        assert sim.time == len(frames) / 40 < 1.0

@@ -1,6 +1,7 @@
 """Scene files that chance has changed: refused with an `rts.Error`, or valid, and then nothing in them is not a number."""
 
 import copy
+import json
 import math
 import warnings
 
@@ -8,8 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scenes import FLAT, SOLID, paths, to_toml, value_at
-from trial import fill
+from scenes import FLAT, FOREIGN, SOLID, paths, to_toml, value_at
 
 import taichi_rts as rts
 from taichi_rts.backend import Backend
@@ -54,7 +54,18 @@ def wholes(draw):
 @st.composite
 def mutated(draw):
     """A valid scene of which some values are others, gone, twice there, or scaled."""
-    data = draw(wholes())
+    return to_toml(draw(spoiled(wholes()))).encode()
+
+
+@st.composite
+def mutated_json(draw):
+    """The same of a SPlisHSPlasH scene, in JSON, which knows NaN and Infinity."""
+    return json.dumps(draw(spoiled(st.builds(copy.deepcopy, st.just(FOREIGN))))).encode()
+
+
+@st.composite
+def spoiled(draw, sources):
+    data = draw(sources)
     for _ in range(draw(st.integers(1, 3))):
         path = draw(st.sampled_from(paths(data)))
         owner, key = value_at(data, path[:-1]), path[-1]
@@ -67,13 +78,13 @@ def mutated(draw):
             owner[key] *= draw(st.sampled_from([-1.0, 1e-6, 0.5, 2.0, 1e3, 1e6]))
         else:
             owner[key] = draw(numbers if change == "number" else values)
-    return to_toml(data).encode()
+    return data
 
 
 @st.composite
-def garbled(draw):
-    """The text of a valid scene in which some bytes are others."""
-    text = bytearray(to_toml(draw(wholes())).encode())
+def garbled(draw, text):
+    """A text in which some bytes are others."""
+    text = bytearray(draw(text))
     for _ in range(draw(st.integers(1, 4))):
         place = draw(st.integers(0, len(text) - 1))
         length = draw(st.integers(0, 6))
@@ -83,25 +94,44 @@ def garbled(draw):
     return bytes(text)
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("outer") / "random"
-    made.mkdir()
-    fill(made)
-    return made
+def attempts(count):
+    """Settings for `count` examples, the same in every run."""
+    return settings(
+        max_examples=count,
+        deadline=10_000,  # [ms] of the clock: far more than any scene takes, even on a busy machine; what hangs takes longer
+        derandomize=True,
+        database=None,
+        suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow, HealthCheck.data_too_large],
+    )
+
+
+whole_texts = wholes().map(lambda data: to_toml(data).encode())
+foreign_text = json.dumps(FOREIGN).encode()
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # NumPy's of numbers that are refused right after
-@given(text=st.one_of(mutated(), mutated(), mutated(), garbled(), st.binary(max_size=60)))
-@settings(
-    max_examples=1000,
-    deadline=10_000,  # [ms] of the clock: far more than any scene takes, even on a busy machine; what hangs takes longer
-    derandomize=True,
-    database=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow, HealthCheck.data_too_large],
-)
+@given(text=st.one_of(mutated(), mutated(), mutated(), garbled(whole_texts), st.binary(max_size=60)))
+@attempts(1000)
 def test_never_a_traceback_never_a_hang_never_a_nan(folder, text):
-    path = folder / "scene.toml"
+    check(folder / "scene.toml", text)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@given(text=st.one_of(mutated_json(), mutated_json(), mutated_json(), garbled(st.just(foreign_text))))
+@attempts(300)
+def test_the_same_of_scenes_of_splishsplash(folder, text):
+    check(folder / "scene.json", text)
+
+
+def test_the_whole_scene_of_splishsplash_is_valid(folder):
+    (folder / "scene.json").write_bytes(foreign_text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        scene = rts.load_scene(folder / "scene.json")
+    assert (len(scene.fluids), len(scene.inflows), len(scene.obstacles)) == (2, 1, 1)
+
+
+def check(path, text):
     path.write_bytes(text)
     try:
         with warnings.catch_warnings():

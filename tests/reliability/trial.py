@@ -5,18 +5,21 @@ import gzip
 import io
 import os
 import pickle
+import sys
 import time
 import zipfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scenes import FILES
 
 from taichi_rts import cli
 
-PATIENCE = 3.0  # CPU seconds: 2 on a quiet machine
-"""Seconds of the processor within which bad input has to be refused; a busy machine takes longer."""
+PATIENCE = 2.0
+"""Seconds of the processor within which bad input has to be refused."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,33 @@ def tree(folder: Path) -> dict[str, tuple[int, int, int]]:
         written = (0, 0) if path.is_dir() else (facts.st_size, facts.st_mtime_ns)  # of a folder only that it is there
         found[path.relative_to(folder).as_posix()] = (facts.st_mode, *written)
     return found
+
+
+@contextlib.contextmanager
+def without(package: str | None) -> Iterator[None]:
+    """Let `package`, if it is one, be not installed: neither imported nor found."""
+    if package is None:
+        yield
+        return
+    kept = {name: sys.modules.pop(name) for name in [*sys.modules] if name.partition(".")[0] == package}
+    finders = [finder for finder in sys.meta_path if hasattr(finder, "find_spec")]
+    sys.meta_path[:] = [Hiding(package, finder) for finder in finders]
+    try:
+        yield
+    finally:
+        sys.meta_path[:] = finders
+        sys.modules.update(kept)
+
+
+class Hiding:
+    """Finds what another finder finds, except for one package."""
+
+    def __init__(self, package: str, finder: Any) -> None:
+        self.package = package
+        self.finder = finder
+
+    def find_spec(self, name: str, path: Any = None, target: Any = None) -> Any:
+        return None if name.partition(".")[0] == self.package else self.finder.find_spec(name, path, target)
 
 
 def attempt(folder: Path, *args: str) -> Trial:

@@ -1,0 +1,35 @@
+"""The last ticks that a run may have give the bits of the first: what is due is integer arithmetic, and none of it overflows."""
+
+import dataclasses
+
+import pytest
+
+import taichi_rts as rts
+from taichi_rts.handover import Snapshot
+from taichi_rts.stepping.timeline import MAX_TICKS
+
+TICKS = 64
+
+
+@pytest.mark.parametrize(
+    "stepper",
+    [
+        rts.Asynchronous(),
+        pytest.param(rts.Uniform(adaptive=True), marks=pytest.mark.slow),
+        pytest.param(rts.Regional(), marks=pytest.mark.slow),
+        pytest.param(rts.Regional(preset="paper"), marks=pytest.mark.slow),
+    ],
+    ids=lambda stepper: stepper.name,
+)
+def test_the_last_ticks_are_like_the_first(simulate, stepper):
+    sim = simulate(rts.load_scene("dam_break_2d", particles=100, end_time=0.1), stepper)
+    start, tick = Snapshot.of(sim), sim.timeline.tick
+    states = []
+    for begin in (0, MAX_TICKS - TICKS):
+        dataclasses.replace(start, time=begin * tick).put_into(sim)
+        sim.advance_to((begin + TICKS) * tick)
+        states.append([field.to_numpy() for field in (sim.particles.x, sim.particles.v, sim.particles.rho)])
+    for first, last in zip(*states, strict=True):
+        assert first.tobytes() == last.tobytes()
+    with pytest.raises(rts.TimeError, match="beyond the longest run"):
+        sim.advance_to((MAX_TICKS + 1.5) * tick)
