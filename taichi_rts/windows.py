@@ -191,15 +191,16 @@ class NeighbourSum:
         self.pair = pair
         self.dtype = backend.dtype
         self.by_windows = windows is not None
-        self.wall: Any = next((wall for wall in walls if wall.windows is not None), None)
+        wall: Any = next((wall for wall in walls if wall.windows is not None), None)
+        self.wall = wall
         """The wall at rest, of which there is one at most, if it has windows."""
-        self.has_wall = self.wall is not None
+        self.has_wall = wall is not None
         if windows is not None:
             self.windows = windows
             self.copies = windows.copies(names, near, windows.inside)
         if self.has_wall:
-            self.wall_copies = self.wall.windows.copies(wall_names, self.wall, self.wall.windows.inside)
-            self.wall_pair = make_wall_pair(self.wall.windows.inside)
+            self.wall_copies = wall.windows.copies(wall_names, wall, wall.windows.inside)
+            self.wall_pair = make_wall_pair(wall.windows.inside)
 
         @ti.func
         def pair_here(i, j):
@@ -208,7 +209,7 @@ class NeighbourSum:
         lanes = None if windows is None else 1  # beside windows it is seldom used
         self.plain_fluid = make_neighbour_sum(grid.geometry, grid.start, pair_here, width, backend, lanes)
         self.other_walls = make_wall_sum(
-            [wall for wall in walls if wall is not self.wall], grid, make_wall_pair, width, backend
+            [other for other in walls if other is not wall], grid, make_wall_pair, width, backend
         )
 
     @ti.func
