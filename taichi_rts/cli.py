@@ -344,6 +344,6 @@ def _execute(command: Any) -> None:
             print(f"taichi-rts: {error}", file=sys.stderr)
             raise SystemExit(2) from None
         except KeyboardInterrupt as stop:
-            said = str(stop) or "interrupted; frames already written are complete"
+            said = str(stop) or "interrupted; what is written already is whole"
             print(f"taichi-rts: {said}", file=sys.stderr)
             raise SystemExit(getattr(stop, "exit_code", 130)) from None
