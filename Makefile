@@ -5,11 +5,12 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3.10 python3 p
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test test-slow lint types format clean
+.PHONY: help demo test test-slow lint types format api clean
 
 help:
 	@echo "make demo    render the double dam break, coloured by region, into out/double_dam_break"
 	@echo "make test    run the tests; make test-slow the long ones"
+	@echo "make api     write the API reference into build/api"
 	@echo "make lint types format clean"
 
 # One stamp for each set of packages: the demo needs no developer's tools.
@@ -46,6 +47,10 @@ types: $(VENV)/.installed-dev
 format: $(VENV)/.installed-dev
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+# From docstrings; open build/api/index.html.
+api: $(VENV)/.installed-dev
+	$(BIN)/python docs/api.py
 
 clean:
 	rm -rf $(VENV) build dist out *.egg-info .pytest_cache .ruff_cache .mypy_cache

@@ -136,10 +136,10 @@ class Run:
 
     def __call__(self) -> None:
         """Run it."""
-        if self.gui and (self.panels or self.debug or self.resume or self.checkpoint_every):
+        if self.gui and (foreign := [key for key in NOT_IN_WINDOW if getattr(self, key) != getattr(Run, key)]):
             raise OutputError(
-                "--gui shows one run from its start and checks nothing; leave out --panels, --debug, --resume and "
-                "--checkpoint-every, or --gui"
+                "--gui shows one run from its start, checks nothing and saves only what its keys ask for; "
+                f"leave out {flags(foreign)}, or --gui"
             )
         if self.resume is not None:
             self.go_on(self.resume)
@@ -147,10 +147,6 @@ class Run:
         scene = self.load()
         stepper = self.make_stepper()
         panels = self.make_panels(scene.name, stepper)
-        if self.gui and (self.video or self.gif or self.export or not self.frames):
-            raise OutputError(
-                "--gui saves only what its keys ask for; leave out --video, --gif, --export and --no-frames, or --gui"
-            )
         if self.gui:
             from taichi_rts.rendering.live import watch  # only here, because it needs Vulkan and a display
 
@@ -259,12 +255,17 @@ class Run:
 
 STEPPER_OPTIONS = sorted({key for kind in STEPPERS.values() for key in kind.__dataclass_fields__} & set(vars(Run)))
 """Options of `Run` that are some stepper's parameters."""
+NOT_IN_WINDOW = (
+    *("panels", "debug", "resume", "checkpoint_every", "frames", "video", "gif", "export", "attributes"),
+    *("views", "quality", "transparent"),
+)
+"""Options of `Run` that a window cannot obey. `export_fps` and `overwrite` say nothing there, but demos set the first."""
 DEFAULT_SCENE = "double_dam_break"
 
 
 def flags(keys: list[str]) -> str:
-    """Return options of `Run` as a user writes them."""
-    return ", ".join(f"--{key.replace('_', '-')}" for key in keys)
+    """Return options of `Run` as a user writes them; what is on by default is switched off."""
+    return ", ".join(f"--{'no-' if getattr(Run, key) is True else ''}{key.replace('_', '-')}" for key in keys)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -343,6 +344,6 @@ def _execute(command: Any) -> None:
             print(f"taichi-rts: {error}", file=sys.stderr)
             raise SystemExit(2) from None
         except KeyboardInterrupt as stop:
-            said = str(stop) or "interrupted; frames already written are complete"
+            said = str(stop) or "interrupted; what is written already is whole"
             print(f"taichi-rts: {said}", file=sys.stderr)
             raise SystemExit(getattr(stop, "exit_code", 130)) from None

@@ -131,7 +131,7 @@ class Inflow:
         return abs(self.velocity[self.axis])
 
     def reach(self, direction: Vector) -> float:
-        """Largest value of direction.x over the patch; `direction` is (dim,)."""
+        """Largest value of direction.x over the patch [m times the unit of `direction`, (dim,)]."""
         return box_reach(self.lower, self.upper, direction)
 
     @property

@@ -166,7 +166,10 @@ Motion = Annotated[
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class BoxObstacle:
-    """A box between two corners `lower` and `upper` [m], (dim,), turned by `rotation` [degrees] about its middle."""
+    """A box between two corners `lower` and `upper` [m], (dim,), turned by `rotation` [degrees] about its middle.
+
+    `motion` says how it moves, None: not at all; in a scene file its `shape` is "box". Raises `SceneError`.
+    """
 
     lower: Vector
     upper: Vector
@@ -188,7 +191,10 @@ class BoxObstacle:
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class SphereObstacle:
-    """A sphere, in two dimensions a disc, around `centre` [m], (dim,), with `radius` [m]."""
+    """A sphere, in two dimensions a disc, around `centre` [m], (dim,), with `radius` [m].
+
+    `motion` says how it moves, None: not at all; in a scene file its `shape` is "sphere". Raises `SceneError`.
+    """
 
     centre: Vector
     radius: Positive
@@ -204,7 +210,10 @@ class SphereObstacle:
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class CylinderObstacle:
-    """A round cylinder with `radius` [m] whose axis goes from `start` to `end` [m], (3,)."""
+    """A round cylinder with `radius` [m] whose axis goes from `start` to `end` [m], (3,).
+
+    `motion` says how it moves, None: not at all; in a scene file its `shape` is "cylinder". Raises `SceneError`.
+    """
 
     start: Annotated[tuple[Number, ...], Len(3, 3)]
     end: Annotated[tuple[Number, ...], Len(3, 3)]
@@ -223,7 +232,10 @@ class CylinderObstacle:
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class PolygonObstacle:
-    """A polygon in two dimensions with corners `points` [m], (K, 2), in either direction, whose edges do not cross."""
+    """A polygon in two dimensions with corners `points` [m], (K, 2), in either direction, whose edges do not cross.
+
+    `motion` says how it moves, None: not at all; in a scene file its `shape` is "polygon". Raises `SceneError`.
+    """
 
     points: Annotated[tuple[Annotated[tuple[Number, ...], Len(2, 2)], ...], Len(3)]
     motion: Motion | None = None
@@ -249,7 +261,8 @@ class MeshObstacle:
         scale: metres per unit of the file, one number or one for each axis.
         rotation: [degrees] about the file's origin, after scaling.
         translation: [m], (3,), after turning.
-        motion: how it moves.
+        motion: how it moves; None: not at all.
+        shape: "mesh", as a scene file has it.
     """
 
     file: str

@@ -196,7 +196,7 @@ class Particles:
         return f"particles from {self.lower} to {self.upper}"
 
     def reach(self, direction: Vector) -> float:
-        """Largest value of direction.x over the centres; `direction` is (dim,)."""
+        """Largest value of direction.x over the centres [m times the unit of `direction`, (dim,)]."""
         return float((self.positions @ np.asarray(direction)).max())
 
     def separation(self, other: Any) -> float:

@@ -41,7 +41,10 @@ BUILT_IN = Path(__file__).parent / "scenes"
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class View:
-    """Where pictures are taken from: `azimuth` and `elevation` [degrees] around the domain, or `eye` and `target` [m]."""
+    """Where pictures are taken from: `azimuth` and `elevation` [degrees] around the domain, or `eye` and `target` [m], (3,).
+
+    `zoom` enlarges what is seen from there. Raises `SceneError`.
+    """
 
     azimuth: Number = -35.0
     elevation: Annotated[Number, Field(ge=-90, le=90)] = 20.0
@@ -94,6 +97,8 @@ class Scene:
         obstacles: rigid bodies, at rest or moving as prescribed (`taichi_rts.obstacles`); fluid inside them is left out.
         end_time: how long the scene is worth watching [s].
         view: where pictures are taken from.
+        name: what the scene is called, and its folder of results.
+        description: one line for lists of scenes.
 
     Raises `SceneError` that lists every fault at once.
     """

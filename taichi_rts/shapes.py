@@ -34,7 +34,7 @@ class Box:
         return tuple(b - a for a, b in zip(self.lower, self.upper, strict=True))
 
     def reach(self, direction: Vector) -> float:
-        """Largest value of direction.x over the box; `direction` is (dim,)."""
+        """Largest value of direction.x over the box [m times the unit of `direction`, (dim,)]."""
         return box_reach(self.lower, self.upper, direction)
 
 
@@ -70,7 +70,7 @@ class Block:
         return f"block from {self.lower} to {self.upper}"
 
     def reach(self, direction: Vector) -> float:
-        """Largest value of direction.x over the block; `direction` is (dim,)."""
+        """Largest value of direction.x over the block [m times the unit of `direction`, (dim,)]."""
         return box_reach(self.lower, self.upper, direction)
 
 
@@ -115,7 +115,7 @@ class Sphere:
         return f"sphere of radius {self.radius} around {self.centre}"
 
     def reach(self, direction: Vector) -> float:
-        """Largest value of direction.x over the sphere; `direction` is (dim,)."""
+        """Largest value of direction.x over the sphere [m times the unit of `direction`, (dim,)]."""
         return sum(d * x for d, x in zip(direction, self.centre, strict=True)) + self.radius * math.hypot(*direction)
 
 

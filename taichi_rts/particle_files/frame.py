@@ -33,7 +33,7 @@ class ParticleFrame:
         return int(self.positions.shape[1])
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return `position` and all attributes, vectors with three components: what formats for 3D tools hold."""
+        """Return `position` and all attributes, (N,) or (N, 3) each, what is 2D with a zero: what formats for 3D tools hold."""
         return {name: pad(values) for name, values in {"position": self.positions, **self.attributes}.items()}
 
     def columns(self) -> dict[str, np.ndarray]:

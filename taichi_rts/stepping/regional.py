@@ -121,7 +121,7 @@ class Regional:
         return FROM_LEVELS[key](self.resolved("levels")) if value is None else value
 
     def in_scene(self, scene: Scene) -> "Regional":
-        """Return a copy in which nothing is None any more."""
+        """Return a copy in which nothing is None any more; raises `StepperError` if the preset is not for such a scene."""
         if scene.regional_sound is None:
             keys = ("levels", "courant", "strict_cfl", "lambda_f", "limiter", "steps")
             settings: dict[str, Any] = {key: self.resolved(key) for key in keys}

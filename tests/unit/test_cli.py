@@ -97,7 +97,9 @@ def test_existing_output_is_kept(two_runs):
         (["run", "dam_break", "--panels", "figure3", "--levels", "3"], ["--panels figure3", "--levels"]),
         (["run", "dam_break", "--panels", "steppers", "--stepper", "uniform"], ["--panels steppers", "--stepper"]),
         (["run", "dam_break", "--colour-by", "age"], ["age", "lead"]),
-        (["run", "dam_break", "--gui", "--debug"], ["--gui", "--debug"]),
+        (["run", "dam_break", "--gui", "--debug"], ["--gui", "leave out --debug, or"]),
+        (["run", "dam_break", "--gui", "--views", "top", "--quality", "best"], ["leave out --views, --quality, or"]),
+        (["run", "dam_break", "--gui", "--transparent", "--no-frames"], ["leave out --no-frames, --transparent, or"]),
         (["run", "dam_break", "--arch", "tpu"], ["tpu"]),
         (["run", "dam_break", "--width", "1"], ["1 x 720"]),
         (["run", "dam_break", "--export-fps", "0"], ["export_fps"]),
@@ -113,6 +115,15 @@ def test_bad_input_is_one_message_and_exit_code_2(args, words, tmp_path, capsys)
         assert word in captured.err + captured.out
     assert "Traceback" not in captured.err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_window_takes_what_demos_set_and_what_it_can_obey(monkeypatch):
+    seen = []
+    monkeypatch.setattr("taichi_rts.rendering.live.watch", lambda *args: seen.append(args))
+    parse("--gui", "--colour-by", "speed", "--width", "640", "--palette", "paper", "--azimuth", "10")()
+    _, stepper, options, _, _ = seen[0]
+    assert stepper == rts.Regional(preset="paper")
+    assert (options.colour_by, options.width, options.palette, options.azimuth) == ("speed", 640, "paper", 10.0)
 
 
 def parse(*args):

@@ -145,3 +145,19 @@ def test_nobody_gets_into_meshes_or_a_paddle_in_a_dam_break(simulate):
             assert mesh.contains(x - obstacle.translation).sum() == 0  # by trimesh's own rays
     assert x[:, 0].max() > 1.3  # it has come past all of them
     assert sim.statistics["runaways"] == 0
+
+
+@pytest.mark.slow
+def test_nobody_is_in_a_ball_or_a_wedge_after_two_seconds_at_the_scenes_own_spacing(taichi_cpu):
+    trimesh = pytest.importorskip("trimesh")
+    scene = rts.load_scene(MESHES / "dam_break_meshes.toml")
+    scene = scene.replace(obstacles=scene.obstacles[:2])
+    sim = rts.Simulation(scene, rts.Uniform())
+    meshes = [trimesh.load_mesh(obstacle.file) for obstacle in scene.obstacles]
+    for time in (0.5, 1.0, 1.5, 2.0):
+        sim.advance_to(time)
+        x = sim.positions()
+        for mesh, obstacle in zip(meshes, scene.obstacles, strict=True):
+            assert mesh.contains(x - obstacle.translation).sum() == 0
+    assert sim.count == 6144
+    assert sim.statistics["runaways"] == 0

@@ -1,0 +1,123 @@
+"""What stands in the docs is run, smaller: some pages from top to bottom, commands of others, every Python block."""
+
+import subprocess
+import sys
+
+import checking
+import pytest
+import taichi as ti
+from documents import PAGES, ROOT, blocks, commands, commands_of, name
+
+from taichi_rts import cli
+
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_environment")]
+
+PICTURE = ["--width", "240", "--height", "160", "--quality", "draft"]
+APPENDED = {
+    "run": ["--end-time", "0.1", "--export-fps", "20", "--particles", "200", "--checkpoint-every", "0.05", *PICTURE],
+    "resume": PICTURE,
+    "compare": ["--particles", "60", "--end-time", "0.04", "--courants", "0.4", "--samples", "4"],
+    "stability": ["--cases", "gap", "--steppers", "serna", "--tolerance", "1", "--no-plot"],
+}
+"""Options that are appended to a command of each kind, so that they win."""
+REPLACED = {
+    "000000.500000000": "000000.050000000",
+    "000010.vtu": "000001.vtu",
+    "spacing=0.04": "spacing=0.1",
+    "spacing=0.05": "spacing=0.1",
+    'arch="auto"': 'arch="cpu"',
+    "advance_to(0.5)": "advance_to(0.02)",
+    "particles=500": "particles=60, end_time=0.04",
+    "courants=(0.4, 0.8)": "courants=(0.4,), samples=4, repeats=1",
+}
+"""Words of commands and of Python blocks, and what stands for them here."""
+WHOLE = ["docs/tutorial.md", "docs/restart.md", "docs/rendering.md"]
+"""Pages that are run from top to bottom; of the others Python blocks and these:"""
+CHOSEN = [
+    ("README.md", "--panels figure3"),
+    ("docs/files.md", "--export vtu ply bgeo"),
+    ("docs/flow.md", "run torricelli"),
+    ("docs/obstacles.md", "dam_break_meshes"),
+    ("docs/scene_files.md", "run DamBreakModel.json"),
+    ("docs/stability.md", "--cases piston"),
+]
+A_RUN = "import taichi_rts as rts\nrts.init('cpu')\nsim = rts.Simulation(rts.load_scene('dam_break_2d', spacing=0.1))\n"
+TAKEN_FOR_GRANTED = {"docs/restart.md": A_RUN, "docs/stability.md": A_RUN}
+"""What was said before a page's Python blocks."""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder to work in, with what a clone has in it."""
+    for part in ("assets", "demos"):
+        (tmp_path / part).symlink_to(ROOT / part)
+    checking.write_stand_ins(tmp_path, {})
+    monkeypatch.chdir(tmp_path)
+    yield tmp_path
+    ti.reset()
+
+
+def replaced(text):
+    for word, other in REPLACED.items():
+        text = text.replace(word, other)
+    return text
+
+
+def smaller(words):
+    """A command of `taichi-rts` as long as a test may take; a size and an end that it names give way."""
+    kind, *rest = (replaced(word) for word in words[1:])
+    resumes = kind == "run" and "--resume" in rest
+    for option in ("--spacing", "--particles"):
+        if option in rest:
+            del rest[rest.index(option) : rest.index(option) + 2]
+    if resumes and "--end-time" in rest:
+        rest[rest.index("--end-time") + 1] = "0.15"
+    return [kind, *rest, *APPENDED.get("resume" if resumes else kind, ())]
+
+
+def run_shell(text):
+    """Run the commands of a block that are ours."""
+    for words in commands_of(text):
+        if words[0] == "taichi-rts":
+            cli.main(smaller(words))
+
+
+def run_python(text, page, folder):
+    """Run a block; one that starts processes in a program of its own, which they import."""
+    text = TAKEN_FOR_GRANTED.get(page, "") + replaced(text)
+    if "__main__" in text:
+        (folder / "block.py").write_text(text)
+        subprocess.run([sys.executable, "block.py"], check=True, timeout=300)
+    else:
+        exec(compile(text, page, "exec"), {"__name__": "block"})
+
+
+@pytest.mark.parametrize("page", WHOLE)
+def test_a_page_from_top_to_bottom(page, folder):
+    for block in blocks(page):
+        if block.file:
+            with open(folder / block.file, "a") as scene:
+                scene.write(block.text)
+        elif block.language == "sh":
+            run_shell(block.text)
+        elif block.language == "python":
+            run_python(block.text, page, folder)
+    runs = sorted(folder.glob("out/*/run.json"))
+    assert len(runs) >= 2
+    assert len(sorted(folder.glob("out/*/frames/000002.png"))) >= 2
+
+
+@pytest.mark.parametrize("page", [name(page) for page in PAGES if name(page) not in WHOLE])
+def test_python_blocks(page, folder):
+    for block in blocks(page):
+        if block.language == "python":
+            run_python(block.text, page, folder)
+
+
+@pytest.mark.parametrize(("page", "words"), CHOSEN)
+@pytest.mark.filterwarnings("ignore::UserWarning")  # what of a SPlisHSPlasH scene is not honoured
+def test_chosen_commands(page, words, folder):
+    found = [command for command in commands(page) if words in checking.as_text(command)]
+    assert found, f"{page} has no command with {words}; choose another"
+    cli.main(smaller(found[0]))
+    assert list(folder.glob("out/**/*.json"))
