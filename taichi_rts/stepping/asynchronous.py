@@ -396,13 +396,15 @@ class AsynchronousSchedule(Cells):
     @ti.func
     def wake(self, block, now, shortest):
         """End the steps of a cell's particles where they are too long beside a step of `shortest` that begins at `now`."""
+        woken = 0
         for k in range(self.grid.first(block), self.grid.first(block + 1)):
             i = self.grid.order[k]
             began, step = self.particles.updated[i], self.particles.level[i]
             end = self.limiter.woken_end(began, step, now, shortest)
             if end < began + step:
                 self.particles.level[i] = end - began
-                self.wakes[None] += ti.cast(began < now, ti.i32)
+                woken += ti.cast(began < now, ti.i32)
+        self.wakes[None] += woken  # an atomic in the loop would end it on lavapipe
 
     @ti.kernel
     def log_pass(self):
