@@ -16,6 +16,22 @@ def quick():
     return QUICK
 
 
+@pytest.fixture(scope="session")
+def on_demand():
+    """Return a dictionary that makes what is asked for, once, with a function of the key: slow tests may ask for more."""
+
+    class OnDemand(dict):
+        def __init__(self, make):
+            super().__init__()
+            self.make = make
+
+        def __missing__(self, key):
+            self[key] = self.make(key)
+            return self[key]
+
+    return OnDemand
+
+
 @pytest.fixture(scope="module")
 def quick_environment(kernel_cache):
     """The same for what calls `rts.init` itself: commands, and programs in processes of their own."""

@@ -26,6 +26,7 @@ def single(start_taichi):
         return run()
 
 
+@pytest.mark.slow
 def test_single_and_double_precision_agree(single, taichi_cpu_f64):
     double = run()
     assert (single[0].dtype, double[0].dtype) == (np.float32, np.float64)

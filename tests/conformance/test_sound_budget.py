@@ -22,6 +22,7 @@ def impact():
     return sim, start
 
 
+@pytest.mark.slow
 def test_energy_less_what_changes_of_sound_speed_do_is_kept(impact):
     """Measured: -2.5 % with that work left out, -27.1 % with it."""
     sim, start = impact

@@ -7,22 +7,26 @@ import taichi_rts as rts
 every_problem = pytest.mark.parametrize("name", PROBLEMS)
 
 
-@pytest.fixture(scope="module", params=STEPPERS)
+LONG = ("uniform_symplectic_euler", "uniform_adaptive", "regional_graded", "asynchronous_integers")
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=[pytest.mark.slow] if name in LONG else []) for name in STEPPERS],
+)
 def stepper(request):
     return request.param
 
 
 @pytest.fixture(scope="module")
-def runs(start_taichi, quick, stepper):
-    class Runs(dict):
-        def __missing__(self, name):
-            if stepper in IN_2D_ONLY and PROBLEMS[name].scene.dim == 3:
-                pytest.skip("steppers of its kind run in three dimensions")
-            with start_taichi("cpu", "f64", **quick):  # anew for each, or the cache does not know the kernels again
-                self[name] = record(PROBLEMS[name], STEPPERS[stepper])
-            return self[name]
+def runs(start_taichi, quick, on_demand, stepper):
+    def run(name):
+        if stepper in IN_2D_ONLY and PROBLEMS[name].scene.dim == 3:
+            pytest.skip("steppers of its kind run in three dimensions")
+        with start_taichi("cpu", "f64", **quick):  # anew for each, or the cache does not know the kernels again
+            return record(PROBLEMS[name], STEPPERS[stepper])
 
-    return Runs()
+    return on_demand(run)
 
 
 @every_problem
@@ -162,7 +166,10 @@ def test_output_times_do_not_change_the_run(start_taichi, quick, runs, stepper):
         assert sim.statistics["base_steps"] == runs[name].statistics["base_steps"]
 
 
-@pytest.mark.parametrize(("name", "density"), [("dam_break_3d", "summation"), ("dam_break_2d", "continuity")])
+@pytest.mark.parametrize(
+    ("name", "density"),
+    [("dam_break_3d", "summation"), pytest.param("dam_break_2d", "continuity", marks=pytest.mark.slow)],
+)
 def test_one_level_equals_uniform_bit_for_bit(start_taichi, name, density):
     states = []
     for same in (rts.Uniform(), rts.Regional(levels=1), rts.Asynchronous(levels=1)):

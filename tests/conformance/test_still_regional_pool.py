@@ -14,6 +14,8 @@ import pytest
 
 import taichi_rts as rts
 
+pytestmark = pytest.mark.slow
+
 DEPTH, WIDTH, S, G, CAP = 1.0, 1.5, 0.05, 9.81, 100.0
 POOL = rts.Scene(domain=rts.Box((0, 0), (WIDTH, 1.4)), fluids=[rts.Block((0, 0), (WIDTH, DEPTH))], spacing=S)
 RUNS = {

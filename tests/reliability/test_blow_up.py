@@ -31,6 +31,7 @@ SCENE = (
 PICTURE = ("--width", "160", "--height", "90", "--output-dir", "out")
 
 
+@pytest.mark.slow
 def test_a_courant_far_too_large(tmp_path):
     trial = attempt(tmp_path, "run", *SCENE, *PICTURE, "--stepper", "uniform", "--courant", "2")
     assert trial.code == 2

@@ -57,6 +57,7 @@ def test_the_regional_sound_speed_changes_the_scene_and_skips_what_it_cannot_ser
     assert "use density 'summation'" in note
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stepper", ["regional_c", "asynchronous_c"])
 def test_a_block_at_20_m_s_on_a_pool_with_the_regional_sound_speed(start_taichi, quick, stepper):
     setting = BY_STEPPER[stepper]

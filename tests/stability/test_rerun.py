@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 import taichi_rts as rts
 from taichi_rts.stability import rerun
@@ -15,6 +16,7 @@ def state_after(sim):
     return found
 
 
+@pytest.mark.slow
 def test_a_rerun_is_a_new_run_to_the_last_bit(start_taichi, quick):
     again = Rerun(lambda: None)
     with start_taichi("cpu", "f32", **quick, unrolling_limit=0):

@@ -163,6 +163,7 @@ def test_panels_have_their_own_steppers():
         panels("dam_break", "--panels", "steppers", "--preset", "paper")
 
 
+@pytest.mark.slow
 def test_a_panel_for_each_stepper_at_the_same_time(tmp_path):
     size = ["--spacing", "0.05", "--end-time", "0.02", "--export-fps", "50", "--width", "320", "--height", "360"]
     result = run(

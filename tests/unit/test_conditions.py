@@ -15,7 +15,13 @@ STEPPERS = {
     "regional": rts.Regional(levels=3),
     "asynchronous": rts.Asynchronous(steps="integers", stagger=1),
 }
-each_stepper = pytest.mark.parametrize("stepper", STEPPERS.values(), ids=STEPPERS)
+each_stepper = pytest.mark.parametrize(
+    "stepper",
+    [
+        pytest.param(stepper, id=name, marks=[pytest.mark.slow] if name == "regional" else [])
+        for name, stepper in STEPPERS.items()
+    ],
+)
 
 
 def scene(**changes):
@@ -147,6 +153,7 @@ def test_crossing_a_periodic_face_changes_nothing(simulate, density):
     np.testing.assert_allclose(rho_too, rho, rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_asynchronous_steps_look_back_across_a_periodic_face(simulate):
     stepper, widths = rts.Asynchronous(steps="integers", stagger=1), []
     for velocity in ((0, 0), (1, 0)):  # both slow enough that |v| shortens no step
@@ -241,6 +248,7 @@ def test_viscosity_belongs_to_the_fluid(simulate):
     np.testing.assert_allclose(shear(0.06, 0.02), 1.5 * same, rtol=1e-9, atol=1e-12)  # the harmonic mean 0.03
 
 
+@pytest.mark.slow
 def test_only_viscous_blocks_step_short(simulate):
     still = {"gravity": (0, 0), "sound_speed": 20.0, "walls": False}
     blocks = [rts.Block((0.1, 0.1), (0.3, 0.3), kinematic_viscosity=1.0), rts.Block((0.7, 0.7), (0.9, 0.9))]
@@ -257,6 +265,7 @@ def test_only_viscous_blocks_step_short(simulate):
         assert steps[~thick].min() >= min(6 * viscous, acoustic) * (1 - 1e-6)
 
 
+@pytest.mark.slow
 def test_walls_do_not_let_fluid_slip(simulate):
     """A linear profile over a lattice at rest on the wall feels no viscous force (Morris, Fox & Zhu 1997)."""
     quiet = {"gravity": (0, 0), "artificial_viscosity": 0.0, "sound_speed": 20.0}

@@ -25,6 +25,7 @@ def inside(scene, x, time):
     return found
 
 
+@pytest.mark.slow
 def test_one_level_equals_uniform_bit_for_bit_and_reading_forces_changes_nothing(start_taichi):
     turning = rts.ConstantMotion(velocity=(0.0, 0.5), angular_velocity=4.0)
     scene = rts.Scene(
@@ -73,6 +74,7 @@ def test_water_at_rest_lifts_obstacles_by_what_they_displace(simulate):
         rts.Simulation.obstacle_forces(type("Bare", (), {"scene": pool.replace(obstacles=())})())
 
 
+@pytest.mark.slow
 def test_a_body_pushes_with_the_work_that_is_counted(simulate):
     ram = rts.BoxObstacle((0.1, 0.06), (0.3, 0.94), motion=rts.Keyframes((0.05, 0.25), ((0, 0), (0.2, 0))))
     pushed = rts.Scene(
@@ -130,6 +132,7 @@ def test_blocks_know_the_speed_of_a_body_before_it_arrives(simulate, unstarted):
     np.testing.assert_allclose(turning[np.abs(x - 0.5) < 0.15], 0.5 * np.pi / 0.3 * np.hypot(0.1, 0.1), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_nobody_gets_into_meshes_or_a_paddle_in_a_dam_break(simulate):
     trimesh = pytest.importorskip("trimesh")
     scene = rts.load_scene(MESHES / "dam_break_meshes.toml", spacing=0.05)

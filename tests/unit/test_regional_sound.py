@@ -331,6 +331,7 @@ def test_the_reference_relaxes_to_rest(adapt, elapsed, share):
 # -- a whole run --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_with_one_sound_speed_it_is_the_run_without(start_taichi, quick):
     dam = tank(rts.Block((0, 0), (0.6, 0.6)), domain=rts.Box((0, 0), (1, 1)), sound_speed=None)
     c = dam.wave_speed

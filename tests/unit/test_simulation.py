@@ -90,7 +90,7 @@ def test_reordering_does_not_depend_on_output_times(taichi_cpu_f64, monkeypatch)
     ("stepper", "share"),
     [
         (rts.Uniform(), 1e-12),
-        (rts.Asynchronous(levels=1), 1e-12),
+        pytest.param(rts.Asynchronous(levels=1), 1e-12, marks=pytest.mark.slow),
         (rts.Asynchronous(steps="integers", stagger=1), 1e-3),
     ],
     ids=["uniform", "equal", "integers"],

@@ -54,6 +54,7 @@ def test_nobody_had_to_be_stopped_by_the_domain(corrected):
     assert corrected["stopped_by_domain"] == 0
 
 
+@pytest.mark.slow
 def test_without_the_corrector_it_blows_up(start_taichi, quick, corrected):
     uncorrected = watch(start_taichi, quick, rts.Regional(preset="paper", corrector=False), 0.15)
     assert max(uncorrected["speed"]) > 3 * max(corrected["speed"])

@@ -8,28 +8,31 @@ import taichi_rts as rts
 DEPTH, SPACING = 0.5, 0.1
 CALM = np.sqrt(9.81 * DEPTH)
 
+STEPPERS = {stepper.name: stepper for stepper in (rts.Uniform(), rts.Regional(), rts.Asynchronous())}
+LONG = pytest.param("asynchronous", marks=pytest.mark.slow)
+
 
 @pytest.fixture(scope="module")
-def pools(start_taichi, quick):
-    found = {}
-    for stepper in (rts.Uniform(), rts.Regional(), rts.Asynchronous()):
+def pools(start_taichi, quick, on_demand):
+    def rest(stepper):
         with start_taichi("cpu", "f32", **quick):
-            sim = rts.Simulation(rts.load_scene("still_pool", spacing=SPACING), stepper)
+            sim = rts.Simulation(rts.load_scene("still_pool", spacing=SPACING), STEPPERS[stepper])
             sim.advance_to(2.0)
-            found[stepper.name] = (*sim.state(), sim.pressures(), sim.statistics["stopped_by_domain"])
-    return found
+            return (*sim.state(), sim.pressures(), sim.statistics["stopped_by_domain"])
+
+    return on_demand(rest)
 
 
 def rms_speed(pool):
     return np.sqrt((pool[1].astype(float) ** 2).sum(axis=1).mean())
 
 
-@pytest.mark.parametrize("stepper", ["uniform", "regional", "asynchronous"])
+@pytest.mark.parametrize("stepper", ["uniform", "regional", LONG])
 def test_it_comes_to_rest(pools, stepper):
     assert rms_speed(pools[stepper]) < 0.05 * CALM
 
 
-@pytest.mark.parametrize("stepper", ["uniform", "regional", "asynchronous"])
+@pytest.mark.parametrize("stepper", ["uniform", "regional", LONG])
 def test_depth_stays_and_nobody_is_lost(pools, stepper):
     x, stopped = pools[stepper][0], pools[stepper][-1]
     assert len(x) == 500
@@ -40,7 +43,7 @@ def test_depth_stays_and_nobody_is_lost(pools, stepper):
     assert x[:, 1].max() + 0.5 * SPACING == pytest.approx(DEPTH, rel=0.04)
 
 
-@pytest.mark.parametrize("stepper", ["uniform", "regional", "asynchronous"])
+@pytest.mark.parametrize("stepper", ["uniform", "regional", LONG])
 def test_pressure_carries_the_water_above(pools, stepper):
     x, p = pools[stepper][0], pools[stepper][4]
     inner = (np.abs(x[:, [0, 2]] - 0.5) < 0.3).all(axis=1) & (np.abs(x[:, 1] - 0.25) < 0.15)
@@ -48,6 +51,6 @@ def test_pressure_carries_the_water_above(pools, stepper):
     assert p[inner].mean() == pytest.approx(hydrostatic.mean(), rel=0.1)
 
 
-@pytest.mark.parametrize("stepper", ["regional", "asynchronous"])
+@pytest.mark.parametrize("stepper", ["regional", LONG])
 def test_it_is_as_calm_as_with_uniform_steps(pools, stepper):
     assert rms_speed(pools[stepper]) <= 1.2 * rms_speed(pools["uniform"]) + 0.002 * CALM

@@ -66,6 +66,7 @@ def test_keys_pause_step_reset_colour_and_clip(session, tmp_path):
     assert not list(tmp_path.iterdir())  # nothing is written unasked
 
 
+@pytest.mark.slow
 def test_states_are_saved_and_loaded_and_a_run_may_take_them(session, tmp_path):
     press(session, "l")
     assert "holds no saved state; s saves one" in session.message
