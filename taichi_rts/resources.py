@@ -15,7 +15,7 @@ from taichi_rts.grid import CELLS_PER_BLOCK
 from taichi_rts.scene_size import finest_spacing, size_of
 from taichi_rts.solids import grid_nodes, make_solid
 from taichi_rts.stepping.timeline import MAX_TICKS
-from taichi_rts.windows import TASKS, VECTOR, room
+from taichi_rts.windows import entries, room
 
 if TYPE_CHECKING:
     from taichi_rts.scene import Scene
@@ -75,7 +75,7 @@ def device_bytes(
         + real * SOUND_REALS * regional
     )
     nodes = sum(_nodes(scene, spacing))
-    windows = TASKS * (VECTOR + room(dim, (scene.support_ratio * (1.0 + 2.0 * stepper.drift)) ** dim))
+    windows = entries(room(dim, (scene.support_ratio * (1.0 + 2.0 * stepper.drift)) ** dim))
     near = 2 * dim + 2 + (dim + 1) * integrated + (len(set(scene.viscosities)) > 1)
     reals_seen = near + (WALL_SHARE * (2 * dim + 1) if scene.walls and not scene.periodic else 0.0)
     return (

@@ -31,6 +31,11 @@ def room(dim: int, per_block: float) -> int:
     return math.ceil(ROOM * 3 ** (dim - 1) * (RUN + 2) * per_block)
 
 
+def entries(capacity: int) -> int:
+    """Entries of all windows together, of which each has room for `capacity` particles."""
+    return TASKS * (capacity + VECTOR)
+
+
 @ti.data_oriented
 class Windows:
     """`TASKS` windows on what `start` has sorted into cells; each has room for `capacity` entries."""
@@ -43,7 +48,7 @@ class Windows:
         self.rows = 3 ** (geometry.dim - 1)
         self.capacity = capacity
         self.size = capacity + VECTOR
-        self.entries = TASKS * self.size
+        self.entries = entries(capacity)
         self.columns = (RUN + 2) * CELLS_PER_BLOCK + 1
         self.column_start = ti.field(ti.i32, TASKS * self.columns)
         """First entry of each column of a window; the next one's ends it."""
@@ -206,8 +211,8 @@ class NeighbourSum:
         def pair_here(i, j):
             return pair(near, i, j)
 
-        lanes = None if windows is None else 1  # beside windows it is seldom used
-        self.plain_fluid = make_neighbour_sum(grid.geometry, grid.start, pair_here, width, backend, lanes)
+        # A plain loop: a GPU wants it, and beside windows it is seldom used.
+        self.plain_fluid = make_neighbour_sum(grid.geometry, grid.start, pair_here, width, backend, lanes=1)
         self.other_walls = make_wall_sum(
             [other for other in walls if other is not wall], grid, make_wall_pair, width, backend
         )

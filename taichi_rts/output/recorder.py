@@ -143,9 +143,8 @@ class Recorder:
 
     def _take_up(self, checkpoint: Checkpoint) -> None:
         frames = checkpoint.time * self.recording.fps
-        if (
-            "frames" in checkpoint.extra
-        ):  # if the run had ended between two frames, the last is that of another time now
+        if "frames" in checkpoint.extra:
+            # If the run had ended between two frames, the last is that of another time now.
             self.frames_done = min(checkpoint.extra["frames"], math.floor(frames * (1 + 1e-9)) + 1)
         else:  # it was saved by a script
             self.frames_done = math.ceil(frames * (1 - 1e-9))

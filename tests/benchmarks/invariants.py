@@ -30,7 +30,8 @@ def main():
             print(f"{key}: {'; '.join(said) or 'the same'}", flush=True)
             changed += bool(said)
             if options.write:
-                invariants.write({**invariants.read(), key: found})
+                kept[key] = found
+                invariants.write(kept)
     raise SystemExit(bool(changed) and not options.write)
 
 
