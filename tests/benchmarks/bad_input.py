@@ -20,7 +20,7 @@ from bad_fields import KINDS, field_rows
 from bad_scenes import SCENES
 from rows import RUN, prepare
 from scenes import to_toml
-from trial import attempt, fill, without
+from trial import PATIENCE, attempt, fill, without
 
 
 def fields(folder):
@@ -41,7 +41,7 @@ def fields(folder):
                 with contextlib.suppress(rts.Error):
                     good = bool(rts.load_scene(folder / "scene.toml").fluids)
             else:
-                good = not attempt(folder, *RUN).faults()
+                good = not attempt(folder, *RUN).faults(patience=PATIENCE)
             failed += not good
             cells.append(("valid" if valid else "refused") if good else "**FAILS**")
         row(f"`{each.name}`", *cells)
@@ -56,7 +56,7 @@ def commands(folder, rows):
         prepare(folder, each)
         with without(each.hidden):
             trial = attempt(folder, *each.args)
-        failed += bool(trial.faults(each.words))
+        failed += bool(trial.faults(each.words, PATIENCE))
         said = trial.said.removeprefix("taichi-rts: ").replace("|", "/").replace(str(folder), "FOLDER")
         said = "".join(letter for letter in said if letter.isascii() and letter.isprintable())
         said = " ".join(said.split())

@@ -54,7 +54,8 @@ def run(scene_name, stepper, steps):
     tick = STEPPERS[stepper].timeline(SCENES[scene_name](1.0)).tick
     scene = SCENES[scene_name](steps * tick)
     scene = scene.replace(sound_speed="regional") if stepper.endswith("-c") else scene
-    sim = rts.Simulation(scene, STEPPERS[stepper])
+    # A debug run adds up what changes of the sound speed do.
+    sim = rts.Simulation(scene, STEPPERS[stepper], debug=scene.regional_sound is not None)
     end = (steps + 0.5) * sim.base_step
     first, count = sim.energy(), sim.count
     flow = first.potential  # what could become motion
@@ -62,7 +63,7 @@ def run(scene_name, stepper, steps):
     for k, time in enumerate(np.linspace(0.0, end, SAMPLES + 1)[1:], 1):
         sim.advance_to(time)
         energy, x = sim.energy(), sim.positions()
-        gain.append((energy.total - sim.work() - first.total) / flow)
+        gain.append((energy.total - sim.work() - sim.sound_work() - first.total) / flow)
         kinetic.append(energy.kinetic / flow)
         momentum.append(sim.momentum() / (count * sim.medium.mass * np.sqrt(9.81 * 0.24)))
         left += int(((x < scene.domain.lower) | (x > scene.domain.upper)).any(axis=1).sum())

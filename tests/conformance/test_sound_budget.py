@@ -31,11 +31,13 @@ def test_energy_less_what_changes_of_sound_speed_do_is_kept(impact):
     assert -0.3 < work < -0.1  # sound is damped, never fed
 
 
+@pytest.mark.slow
 def test_momentum_is_kept_to_rounding(impact):
     sim, _ = impact
     assert abs(sim.momentum_drift()).max() < 1e-12 * sim.medium.mass * sim.count * 10.0
 
 
+@pytest.mark.slow
 def test_calm_water_is_soft_again_and_all_is_within_the_rule(impact):
     sim, _ = impact
     sounds = sim.sound_speeds()

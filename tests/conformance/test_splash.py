@@ -58,7 +58,10 @@ def one_sound_speed(start_taichi, quick):
         return Run(SCENE.replace(sound_speed=None), rts.Uniform(courant=COURANT))
 
 
-@pytest.fixture(scope="module", params=STEPPERS)
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=[] if name == "regional" else pytest.mark.slow) for name in STEPPERS],
+)
 def stepper(request):
     return request.param
 

@@ -7,7 +7,7 @@ import taichi_rts as rts
 every_problem = pytest.mark.parametrize("name", PROBLEMS)
 
 
-LONG = ("uniform_symplectic_euler", "uniform_adaptive", "regional_graded", "asynchronous_integers")
+LONG = ("uniform_serna", "uniform_symplectic_euler", "uniform_adaptive", "regional_graded", "asynchronous_integers")
 
 
 @pytest.fixture(
@@ -168,7 +168,11 @@ def test_output_times_do_not_change_the_run(start_taichi, quick, runs, stepper):
 
 @pytest.mark.parametrize(
     ("name", "density"),
-    [("dam_break_3d", "summation"), pytest.param("dam_break_2d", "continuity", marks=pytest.mark.slow)],
+    [
+        ("dam_break_2d", "summation"),
+        pytest.param("dam_break_3d", "summation", marks=pytest.mark.slow),
+        pytest.param("dam_break_2d", "continuity", marks=pytest.mark.slow),
+    ],
 )
 def test_one_level_equals_uniform_bit_for_bit(start_taichi, name, density):
     states = []

@@ -61,6 +61,7 @@ def test_a_courant_far_too_large(tmp_path):
     assert "already holds a run" in again.said
 
 
+@pytest.mark.slow
 def test_a_number_that_is_none(tmp_path, start_taichi, quick):
     scene = rts.load_scene("dam_break_2d", spacing=0.1, end_time=0.2)
     stepper = rts.Uniform()

@@ -10,26 +10,19 @@ from repeat import STEPPERS, leavings
 
 from taichi_rts import backend
 
-QUICK = "asynchronous_sound"  # the one that decides most by what others have done
+pytestmark = pytest.mark.slow  # `make test` compares one thread with all in tests/conformance/test_steppers.py
 
 
-@pytest.mark.parametrize(
-    ("stepper", "threads"),
-    [
-        pytest.param(name, (1, 4) if name == QUICK else (1, 2, 4), marks=() if name == QUICK else pytest.mark.slow)
-        for name in STEPPERS
-    ],
-)
-def test_any_number_of_threads_gives_the_same_bits(start_taichi, quick, stepper, threads):
+@pytest.mark.parametrize("stepper", STEPPERS)
+def test_any_number_of_threads_gives_the_same_bits(start_taichi, quick, stepper):
     runs = []
-    for count in threads:
+    for count in (1, 2, 4):
         with start_taichi("cpu", "f32", cpu_max_num_threads=count, **quick):
             runs.append(leavings(stepper))
     for run in runs[1:]:
         assert not [name for name in runs[0] if run[name] != runs[0][name]]
 
 
-@pytest.mark.slow
 def test_a_vulkan_device_repeats_itself(kernel_cache):
     """Mesa's rasteriser takes its number of threads from the environment; a hardware driver runs twice the same."""
     if not backend.vulkan_device_types():

@@ -11,13 +11,14 @@ from taichi_rts.stepping.timeline import MAX_TICKS
 TICKS = 64
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "stepper",
     [
         rts.Asynchronous(),
-        pytest.param(rts.Uniform(adaptive=True), marks=pytest.mark.slow),
-        pytest.param(rts.Regional(), marks=pytest.mark.slow),
-        pytest.param(rts.Regional(preset="paper"), marks=pytest.mark.slow),
+        rts.Uniform(adaptive=True),
+        rts.Regional(),
+        rts.Regional(preset="paper"),
     ],
     ids=lambda stepper: stepper.name,
 )

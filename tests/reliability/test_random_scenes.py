@@ -112,13 +112,21 @@ foreign_text = json.dumps(FOREIGN).encode()
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # NumPy's of numbers that are refused right after
 @given(text=st.one_of(mutated(), mutated(), mutated(), garbled(whole_texts), st.binary(max_size=60)))
 @attempts(1000)
+@pytest.mark.slow
 def test_never_a_traceback_never_a_hang_never_a_nan(folder, text):
     check(folder / "scene.toml", text)
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@given(text=mutated())
+@attempts(150)
+def test_the_same_of_fewer_scenes(folder, text):
+    check(folder / "scene.toml", text)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @given(text=st.one_of(mutated_json(), mutated_json(), mutated_json(), garbled(st.just(foreign_text))))
-@attempts(300)
+@attempts(150)
 def test_the_same_of_scenes_of_splishsplash(folder, text):
     check(folder / "scene.json", text)
 

@@ -19,7 +19,9 @@ from scenes import FILES
 from taichi_rts import cli
 
 PATIENCE = 2.0
-"""Seconds of the processor within which bad input has to be refused."""
+"""Seconds of the processor within which bad input is refused: measured by tests/benchmarks/bad_input.py."""
+HANG = 20.0
+"""The same where a machine may be busy: in tests, which measure no time."""
 
 
 @dataclass(frozen=True)
@@ -31,13 +33,13 @@ class Trial:
     seconds: float
     changed: tuple[str, ...]
 
-    def faults(self, words: tuple[str, ...] = ()) -> list[str]:
+    def faults(self, words: tuple[str, ...] = (), patience: float = HANG) -> list[str]:
         """Return what is wrong with the way it refused its input."""
         found = [] if self.code == 2 else [f"exit code {self.code}"]
         found += [f"does not say {word!r}" for word in words if word not in self.said]
         found += ["traceback"] if "Traceback" in self.said else []
         found += ["says nothing"] if not self.said.strip() else []
-        found += [f"took {self.seconds:.1f} s"] if self.seconds > PATIENCE else []
+        found += [f"took {self.seconds:.1f} s"] if self.seconds > patience else []
         return found + [f"changed {path}" for path in self.changed]
 
 

@@ -18,7 +18,10 @@ def run(start_taichi, quick, case, stepper, demanded=None):
         return watch(BY_NAME[case].scene, setting.make(setting.default), samples=160, demanded_density=demanded)
 
 
-@pytest.mark.parametrize("stepper", ["serna", "adaptive", "regional"])
+LONG = [pytest.param(stepper, marks=pytest.mark.slow) for stepper in ("serna", "adaptive")]
+
+
+@pytest.mark.parametrize("stepper", ["regional", *LONG])
 def test_a_block_at_mach_one_half_on_a_pool(start_taichi, quick, stepper):
     outcome = run(start_taichi, quick, "pool_impact_0.5", stepper, demanded=1.46)  # of `suite.reference_density`
     assert outcome.reason == ""
@@ -27,7 +30,7 @@ def test_a_block_at_mach_one_half_on_a_pool(start_taichi, quick, stepper):
     assert 0.6 * 40 < outcome.speed < 1.2 * 40
 
 
-@pytest.mark.parametrize("stepper", ["regional", "asynchronous"])
+@pytest.mark.parametrize("stepper", ["regional", pytest.param("asynchronous", marks=pytest.mark.slow)])
 def test_a_block_at_mach_0_7_on_a_wall(start_taichi, quick, stepper):
     outcome = run(start_taichi, quick, "wall_impact_0.7", stepper, demanded=1.66)
     assert outcome.reason == ""

@@ -63,7 +63,10 @@ def record_pass(sim):
     return seen | {"now": sim.timeline.now, "cycle_end": schedule.cycle_end, "after": snapshot(sim)}
 
 
-@pytest.fixture(scope="module", params=STEPPERS)
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=[] if name == "powers_of_two" else pytest.mark.slow) for name in STEPPERS],
+)
 def recorded(request, start_taichi, quick):
     with start_taichi("cpu", "f64", **quick):
         sim = rts.Simulation(SCENE, STEPPERS[request.param], debug=True)

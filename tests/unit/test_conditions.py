@@ -18,7 +18,7 @@ STEPPERS = {
 each_stepper = pytest.mark.parametrize(
     "stepper",
     [
-        pytest.param(stepper, id=name, marks=[pytest.mark.slow] if name == "regional" else [])
+        pytest.param(stepper, id=name, marks=[] if name == "regional" else pytest.mark.slow)
         for name, stepper in STEPPERS.items()
     ],
 )
@@ -137,7 +137,7 @@ def drop(periodic, velocity):
     return scene(fluids=[ball], periodic=periodic, **still)
 
 
-@pytest.mark.parametrize("density", ["summation", "continuity"])
+@pytest.mark.parametrize("density", ["summation", pytest.param("continuity", marks=pytest.mark.slow)])
 def test_crossing_a_periodic_face_changes_nothing(simulate, density):
     end, states = 0.125, []
     for velocity in ((0, 0), (4, 4)):
@@ -183,7 +183,11 @@ def test_gravity_changes_in_flight(simulate, stepper):
 
 @pytest.mark.parametrize(
     "stepper",
-    [rts.Uniform(courant=0.1), rts.Regional(levels=3, courant=0.05), rts.Asynchronous(courant=0.1, stagger=1)],
+    [
+        pytest.param(rts.Uniform(courant=0.1), marks=pytest.mark.slow),
+        rts.Regional(levels=3, courant=0.05),
+        pytest.param(rts.Asynchronous(courant=0.1, stagger=1), marks=pytest.mark.slow),
+    ],
     ids=STEPPERS,
 )
 def test_a_piston_pushes_and_its_work_is_counted(simulate, stepper):
@@ -229,6 +233,7 @@ def test_fluid_flows_in_layer_by_layer(simulate, stepper):
     assert (jet.densities()[pool:] > 500).any()
 
 
+@pytest.mark.slow
 def test_viscosity_belongs_to_the_fluid(simulate):
     quiet = {"gravity": (0, 0), "artificial_viscosity": 0.0, "sound_speed": 20.0, "walls": False}
     lower, upper = rts.LinearField(((0, 0), (0, 0)), value=(1, 0)), rts.LinearField(((0, 0), (0, 0)), value=(-1, 0))

@@ -55,7 +55,8 @@ def test_reset_gives_the_bits_of_a_new_run_and_a_change_goes_on(start_taichi, qu
         assert 0.3 < regional.statistics["active_fraction"] < 1.0
 
 
-@pytest.mark.parametrize("density", ["summation", pytest.param("continuity", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("density", ["summation", "continuity"])
 def test_change_of_stepper_and_viscosity(simulate, density):
     changes = {"sound_speed": "regional"} if density == "summation" else {"density": density}
     still = SCENE.replace(inflows=(), outlets=(), moving_walls=(), **changes)

@@ -83,7 +83,7 @@ def test_faces_without_walls_have_no_force():
     assert FaceForces(jet, medium_of(jet)).faces == ["x-", "x+", "y-", "y+"]  # the patch is a part of the face
 
 
-@pytest.mark.parametrize("density", ["summation", "continuity"])
+@pytest.mark.parametrize("density", ["summation", pytest.param("continuity", marks=pytest.mark.slow)])
 def test_forces_are_the_reaction_to_what_the_solver_does(start_taichi, quick, density):
     """Against the walls' share of all accelerations in a debug run, with no friction at the walls."""
     piston = rts.MovingWall("x+", times=(0.0, 1.0), displacements=(0.0, -0.5))

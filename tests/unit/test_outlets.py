@@ -27,13 +27,7 @@ STEPPERS = {
     "aligned": rts.Regional(levels=4, steps="powers_of_two"),
     "asynchronous": rts.Asynchronous(stagger=1),
 }
-each_stepper = pytest.mark.parametrize(
-    "stepper",
-    [
-        pytest.param(stepper, id=name, marks=[] if name == "regional" else pytest.mark.slow)
-        for name, stepper in STEPPERS.items()
-    ],
-)
+each_stepper = pytest.mark.parametrize("stepper", STEPPERS.values(), ids=STEPPERS)
 
 
 def drop(dim, **changes):
@@ -79,6 +73,7 @@ def test_a_box_without_extent_is_refused_and_a_file_may_hold_one(tmp_path):
         rts.load_scene(file)
 
 
+@pytest.mark.slow
 @each_stepper
 def test_as_much_flows_out_as_in(simulate, stepper):
     sim = simulate(CHANNEL, stepper, debug=True)
@@ -158,7 +153,8 @@ def test_a_run_that_goes_on_has_the_same_bits(start_taichi, quick, tmp_path):
             np.testing.assert_array_equal(one, other)
 
 
-@pytest.mark.parametrize("sound", [pytest.param(20.0, marks=pytest.mark.slow), "regional"])
+@pytest.mark.slow
+@pytest.mark.parametrize("sound", [20.0, "regional"])
 def test_energy_taken_out_is_that_of_the_readers(simulate, sound):
     """Under gravity and pressure; readers sum it in NumPy."""
     dam = drop(2, fluids=[rts.Block((0, 0), (0.3, 0.9))], outlets=[rts.Outlet((0.3, 0), (1, 1))])

@@ -65,7 +65,7 @@ def test_specific_energy_is_the_integral_of_p_over_rho_squared():
     assert tait.specific_energy(np.array([500.0, 1000.0])).tolist() == [0, 0]
 
 
-@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("dim", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_pressure_force_is_the_slope_of_the_internal_energy_walls_included(taichi_cpu_f64, dim, monkeypatch):
     built = SimpleNamespace(terms=None)
 

@@ -78,6 +78,7 @@ def test_levels_follow_eq_2_and_3_from_block_maxima(recorded):
     assert {1, 2} <= met
 
 
+@pytest.mark.slow
 def test_compressed_blocks_step_as_far_as_their_sound_allows(recorded):
     levels = {}
     for local_sound in (True, False):

@@ -69,12 +69,13 @@ def test_standing_wave(errors, stepper):
     assert -0.12 < found["crest"] < 0.02  # measured -0.064, -0.082, -0.107; speed times 1.1: 0.029
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stepper", ["uniform"])
 def test_torricelli(errors, stepper):
     assert -0.1 < errors("torricelli", stepper)["jet"] < -0.05  # measured -0.078; gravity times 1.1 moves it by 0.05
 
 
-@pytest.mark.parametrize("stepper", ["uniform", "paper"])
+@pytest.mark.parametrize("stepper", ["uniform", pytest.param("paper", marks=pytest.mark.slow)])
 def test_koshizuka_oka(errors, stepper):
     found = errors("koshizuka_oka", stepper)
     assert found["front"] < 0.07  # measured 0.051, 0.048

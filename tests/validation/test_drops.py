@@ -67,7 +67,7 @@ def test_elliptical_drop(elliptical, stepper):
     assert np.abs(error[:, 0]).max() < 0.03  # measured 0.0144, 0.0144, 0.0146; 0.05
 
 
-@pytest.mark.parametrize("stepper", ["uniform", "regional", *LONG])
+@pytest.mark.parametrize("stepper", ["uniform", pytest.param("regional", marks=pytest.mark.slow), *LONG])
 def test_oscillating_drop(oscillating, stepper):
     error, _ = oscillating[stepper]
     assert np.abs(error[1]).max() < 0.015  # at a quarter; measured 0.0075, 0.0075, 0.0048; a rate wrong by 1.1: 0.034
@@ -108,6 +108,7 @@ def test_order_of_convergence(simulate):
     assert 0.8 < orders["stale"] < 1.5
 
 
+@pytest.mark.slow
 def test_order_of_convergence_with_an_integrated_density(simulate):
     scene = rts.load_scene("oscillating_drop", spacing=0.125, density="continuity")
     found = []

@@ -30,7 +30,9 @@ def quick_jobs(monkeypatch, quick):
     ti.reset()
 
 
-@pytest.mark.parametrize("stepper", [rts.Regional(preset="paper"), rts.Asynchronous(stagger=1)])
+@pytest.mark.parametrize(
+    "stepper", [rts.Regional(preset="paper"), pytest.param(rts.Asynchronous(stagger=1), marks=pytest.mark.slow)]
+)
 def test_a_rewound_simulation_gives_the_same_bits(start_taichi, quick, stepper):
     with start_taichi(unrolling_limit=0, **quick):
         check_rewind(stepper)
@@ -94,6 +96,7 @@ def test_a_comparison_from_the_command_line(tmp_path, capsys, quick_jobs, monkey
         assert old["errors"] == new["errors"]
 
 
+@pytest.mark.slow
 def test_a_dask_client_is_an_executor(tmp_path):
     pytest.importorskip("distributed")
     scene = rts.load_scene("dam_break_2d", particles=30).replace(end_time=0.004)

@@ -49,7 +49,7 @@ def stop_in_the_middle(sim, time):
     [
         pytest.param("uniform", "f32", marks=pytest.mark.slow),
         pytest.param("regional", "f64", marks=pytest.mark.slow),
-        ("asynchronous", "f32"),
+        pytest.param("asynchronous", "f32", marks=pytest.mark.slow),
     ],
 )
 def test_the_same_bits_as_without_a_stop(start_taichi, quick, tmp_path, name, precision):
