@@ -13,10 +13,18 @@ import taichi as ti
 
 from taichi_rts.backend import Backend
 
+Values: Any = ti.types.ndarray(ndim=1)
+Rows: Any = ti.types.ndarray(ndim=2)
+
 
 def vector_field(dim: int, dtype: Any, count: int) -> ti.MatrixField:
     """A field of `count` vectors as a struct of arrays: one contiguous array a component."""
     return ti.Vector.field(dim, dtype, count, layout=ti.Layout.SOA)
+
+
+def batches(fields: list[ti.Field], most: int) -> list[list[ti.Field]]:
+    """Fields in order, at most `most` at a time."""
+    return [fields[first : first + most] for first in range(0, len(fields), most)]
 
 
 @ti.data_oriented
@@ -93,7 +101,6 @@ class Particles:
             self.viscosity = scalar()
         if self.has_sound:
             self.sound, self.reference = scalar(), scalar()
-            self.reference.fill(rest_density)
         if self.has_guide:
             self.guided_until = integer()
         if self.has_budget:
@@ -102,13 +109,29 @@ class Particles:
                 self.past_wall_push = vector()
             if self.has_sound:
                 self.sound_work = scalar()
-        self.real_scratch = ti.field(backend.dtype, self.capacity)
-        self.integer_scratch = ti.field(ti.i32, self.capacity)
-        unborn = ((0, self.capacity - count), (0, 0))
-        self.x.from_numpy(np.pad(positions, unborn).astype(backend.numpy_dtype))
-        self.v.from_numpy(np.pad(velocities, unborn).astype(backend.numpy_dtype))
-        self.rho.from_numpy(np.pad(densities, unborn[0], constant_values=rest_density).astype(backend.numpy_dtype))
-        self.identity.from_numpy(np.arange(self.capacity, dtype=np.int32))
+        self.real_scratch: list[ti.Field] = []
+        self.integer_scratch: ti.Field = None
+        start = (np.ascontiguousarray(each, backend.numpy_dtype) for each in (positions, velocities, densities))
+        self.load(*start, rest_density)
+
+    @ti.kernel
+    def load(
+        self,
+        x: Rows,
+        v: Rows,
+        rho: Values,
+        rest_density: float,
+    ):
+        """Begin with these, at rest density where nobody is yet; one kernel compiles quicker than many assignments."""
+        for k in self.identity:
+            self.identity[k] = k
+            self.rho[k] = rest_density
+            if ti.static(self.has_sound):
+                self.reference[k] = rest_density
+            if k < x.shape[0]:
+                self.rho[k] = rho[k]
+                for d in ti.static(range(self.dim)):
+                    self.x[k][d], self.v[k][d] = x[k, d], v[k, d]
 
     @property
     def numpy_dtype(self) -> Any:
@@ -138,17 +161,23 @@ class Particles:
         self.reorder(order)
         self.alive[None] = self.count = count
 
+    def borrow(self, reals: list[ti.Field], integer: ti.Field) -> None:
+        """Take fields of others, (capacity,) or more, to put values down while they are reordered; the more, the quicker."""
+        self.real_scratch, self.integer_scratch = reals, integer
+
     def reorder(self, order: ti.Field) -> None:
-        """Move entry `order[k]` of every field to place k, then make `order` the identity."""
+        """Move entry `order[k]` of every field to place k, then make `order` the identity. Writes to what was borrowed."""
         self.reorder_fields(order)
 
     @ti.kernel
     def reorder_fields(self, order: ti.template()):
-        for field in ti.static(self.reals):
+        for few in ti.static(batches(self.reals, len(self.real_scratch))):
             for k in range(self.alive[None]):
-                self.real_scratch[k] = field[order[k]]
+                for n in ti.static(range(len(few))):
+                    self.real_scratch[n][k] = few[n][order[k]]
             for k in range(self.alive[None]):
-                field[k] = self.real_scratch[k]
+                for n in ti.static(range(len(few))):
+                    few[n][k] = self.real_scratch[n][k]
         for field in ti.static(self.integers):
             for k in range(self.alive[None]):
                 self.integer_scratch[k] = field[order[k]]
@@ -190,6 +219,12 @@ class Neighbourhood:
         if self.has_viscosity:
             self.viscosity = ti.field(backend.dtype, padded)
         self.rho.fill(1.0)
+
+    @property
+    def spare(self) -> list[ti.Field]:
+        """Fields that may be written to between steps, (capacity,) or more; a density of 0 would do harm."""
+        vectors = [field.get_scalar_field(d) for field in (self.x, self.v) for d in range(field.n)]
+        return [*vectors, self.p_over_rho2]
 
     @ti.func
     def difference(self, i, j):

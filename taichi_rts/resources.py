@@ -55,8 +55,8 @@ def device_bytes(
     regional = scene.with_sound_for(stepper).regional_sound is not None
     integrated = scene.density == "continuity"
     moving = len(scene.moving_walls) + sum(body.motion is not None for body in scene.obstacles)
-    # In the order of `Particles` (state, scratch), `BlockGrid`, `Neighbourhood` and `Schedule`.
-    reals, integers = (3 * dim + 2) + (2 * dim + 2), 4 + 3 + 2
+    # Reals of `Particles` and `Neighbourhood`, integers of `Particles`, `BlockGrid` and `Schedule`.
+    reals, integers = (3 * dim + 1) + (2 * dim + 2), 3 + 3 + 2
     reals += 1 if stepper.extrapolates_density or integrated else 0
     reals += 1 + (dim + 1) if integrated else 0
     reals += 2 * dim + 1 if stepper.keeps_past else 0

@@ -123,6 +123,7 @@ class Simulation:
             law = FloatingReference(self.medium.equation_of_state, self.particles, self.sound)
             self.medium = dataclasses.replace(self.medium, equation_of_state=law)
         self.near = Neighbourhood(capacity, scene.dim, backend, needs, geometry)
+        self.particles.borrow(self.near.spare, self.grid.rank)
         self._obstacle_layers = start.obstacles
         self._fluids = start.fluids
         self._meter: ForceMeter | None = None

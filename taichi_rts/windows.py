@@ -46,6 +46,9 @@ class Windows:
         self.geometry = geometry
         self.start = start
         self.rows = 3 ** (geometry.dim - 1)
+        self.row_count = ti.field(ti.i32, ())
+        self.row_count[None] = self.rows
+        """As a field, since a loop over a constant few rows would be unrolled: three times as long to compile, and no quicker."""
         self.capacity = capacity
         self.size = capacity + VECTOR
         self.entries = entries(capacity)
@@ -96,21 +99,24 @@ class Windows:
     def gather(self, copies: ti.template(), row, column, number, begin):
         """Copy who lies in the blocks at `column` to entry `begin` and on, as the columns `number` and on; return the end."""
         n = begin
+        rows = self.row_count[None]
         for part in range(CELLS_PER_BLOCK):
             self.column_start[number + part] = n
-            for above in range(self.rows):
+            for above in range(rows):
                 if above == self.rows // 2:
                     self.own_start[number + part] = n
                 cell = self.cell(row, column, above) + part
                 first, last = self.start[cell], self.start[cell + 1]
-                for field, copy, _nobody, axis in ti.static(copies):
-                    if ti.static(axis >= 0 and self.geometry.periodic[axis]):
-                        middle, length = self.middle(row, column, above, axis), ti.static(self.geometry.lengths[axis])
-                        for k in range(first, last):  # the image that lies where the window does
-                            beside = field[k] - middle
+                for k in range(first, last):
+                    for field, copy, _nobody, axis in ti.static(copies):
+                        if ti.static(axis >= 0 and self.geometry.periodic[axis]):
+                            middle, length = (
+                                self.middle(row, column, above, axis),
+                                ti.static(self.geometry.lengths[axis]),
+                            )
+                            beside = field[k] - middle  # the image that lies where the window does
                             copy[n + k - first] = middle + beside - length * ti.floor(beside / length + 0.5)
-                    else:
-                        for k in range(first, last):
+                        else:
                             copy[n + k - first] = field[k]
                 n += last - first
         return n

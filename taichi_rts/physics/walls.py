@@ -17,7 +17,7 @@ import taichi as ti
 
 from taichi_rts.backend import Backend
 from taichi_rts.grid import CELLS_PER_BLOCK, BlockGrid, Geometry, make_neighbour_sum
-from taichi_rts.particles import Neighbourhood, vector_field
+from taichi_rts.particles import Neighbourhood, Rows, Values, vector_field
 from taichi_rts.sampling import WallLayer
 
 LARGEST_SHEAR = 4.0
@@ -54,12 +54,26 @@ class Walls:
         self.stiffness = layer.stiffness
         self.start = ti.field(ti.i32, geometry.cells + 1)
         self.near = ti.field(ti.i32, geometry.blocks)
-        pad = backend.lanes
-        self.x.from_numpy(np.pad(positions[order], ((0, pad), (0, 0))).astype(backend.numpy_dtype))
-        self.volume.from_numpy(np.pad(volumes[order], (0, pad)).astype(backend.numpy_dtype))
-        self.normal.from_numpy(np.pad(layer.normals[order], ((0, pad), (0, 0))).astype(backend.numpy_dtype))
-        self.start.from_numpy(start.astype(np.int32))
-        self.near.from_numpy(near.astype(np.int32))
+        sorted_ = (values[order].astype(backend.numpy_dtype) for values in (positions, volumes, layer.normals))
+        self.load(*sorted_, start.astype(np.int32), near.astype(np.int32))
+
+    @ti.kernel
+    def load(
+        self,
+        x: Rows,
+        volume: Values,
+        normal: Rows,
+        start: Values,
+        near: Values,
+    ):
+        for b in range(x.shape[0]):
+            self.volume[b] = volume[b]
+            for d in ti.static(range(self.x.n)):
+                self.x[b][d], self.normal[b][d] = x[b, d], normal[b, d]
+        for cell in self.start:
+            self.start[cell] = start[cell]
+        for block in self.near:
+            self.near[block] = near[block]
 
     def room_for(self, count: int) -> "Walls":
         """Return the same with room for `count` particles, none of which is there yet."""

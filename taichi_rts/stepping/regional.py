@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 import taichi as ti
 from pydantic import Field
 from pydantic.dataclasses import dataclass
@@ -11,7 +12,7 @@ from pydantic.dataclasses import dataclass
 from taichi_rts.errors import StepperError
 from taichi_rts.grid import BlockGrid
 from taichi_rts.integrators.serna import Serna
-from taichi_rts.particles import Particles
+from taichi_rts.particles import Particles, Rows
 from taichi_rts.scan import ExclusiveScan
 from taichi_rts.scene import Positive, Scene
 from taichi_rts.stepping import criteria
@@ -425,7 +426,13 @@ class RegionalSchedule(Schedule):
         """Return particles and updates per level since the last call."""
         if self.aligned:
             self.count_held()
-        counts = self.occupancy.to_numpy()[1:].tolist(), self.updates.to_numpy()[1:].tolist()
-        self.occupancy.fill(0)
-        self.updates.fill(0)
-        return counts
+        counts = np.zeros((2, self.levels + 1), np.int32)
+        self.read_counts(counts)
+        occupancy, updates = counts[:, 1:].tolist()
+        return occupancy, updates
+
+    @ti.kernel
+    def read_counts(self, counts: Rows):
+        for n in range(self.levels + 1):
+            counts[0, n], counts[1, n] = self.occupancy[n], self.updates[n]
+            self.occupancy[n] = self.updates[n] = 0
