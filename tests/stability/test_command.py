@@ -76,6 +76,7 @@ def test_a_map_is_written_and_resumed(call, capsys, monkeypatch):
     assert (folder / "notes.txt").exists()
 
 
+@pytest.mark.slow
 def test_quick_says_which_default_fails(call, capsys, monkeypatch):
     folder, _ = call("--quick")
     assert "ok" in capsys.readouterr().out

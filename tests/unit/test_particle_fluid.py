@@ -155,6 +155,7 @@ def test_plain_data_names_the_file_or_the_hash(tmp_path):
         scene_from(json.loads(json.dumps(data)))
 
 
+@pytest.mark.slow
 def test_one_runs_output_is_the_nexts_input(start_taichi, quick, tmp_path):
     """Half a dam break, its file, and the other half: the same to rounding as in one go, but for the start of the steps."""
     first = scene(rts.Block((0, 0), (0.8, 0.8)), sound_speed=40.0)

@@ -23,7 +23,7 @@ def test_readers_before_the_first_step(taichi_cpu_f64):
     assert (sim.pressures() == sim.medium.equation_of_state.pressure_numpy(sim.densities())).all()
 
 
-def test_steps_and_leads_are_in_order_of_identity(taichi_cpu_f64):
+def test_steps_and_leads_are_in_order_of_identity(taichi_cpu_f64, unstarted):
     sim = rts.Simulation(SMALL, rts.Asynchronous(levels=8))
     identity = np.arange(50)[::-1].astype(np.int32)
     sim.particles.identity.from_numpy(identity)

@@ -30,9 +30,8 @@ def quick_jobs(monkeypatch, quick):
     ti.reset()
 
 
-@pytest.mark.parametrize(
-    "stepper", [rts.Regional(preset="paper"), pytest.param(rts.Asynchronous(stagger=1), marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("stepper", [rts.Regional(preset="paper"), rts.Asynchronous(stagger=1)])
 def test_a_rewound_simulation_gives_the_same_bits(start_taichi, quick, stepper):
     with start_taichi(unrolling_limit=0, **quick):
         check_rewind(stepper)

@@ -205,6 +205,7 @@ def test_what_contradicts_the_checkpoint_is_refused(reference, capsys, args, wor
     assert sorted(reference.rglob("*")) == before
 
 
+@pytest.mark.slow
 def test_overwrite_never_takes_the_checkpoint_away(copy, tmp_path, capsys, wanted):
     first = sorted((copy / "checkpoints").iterdir())[0]
     inside = copy / "frames" / "mine.npz"
