@@ -55,7 +55,7 @@ def test_run_writes_frames_and_facts(two_runs):
     )
     assert sum(facts["level_fractions"]) == pytest.approx(1.0)
     assert "active fraction" in result.stdout
-    assert "energy drift" in result.stdout
+    assert "energy dissipated" in result.stdout
 
 
 def test_the_same_command_gives_the_same_bits(two_runs):

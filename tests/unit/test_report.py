@@ -72,13 +72,20 @@ def test_table_shows_what_passes_cost(capsys, monkeypatch):
         "steps too long 12: use more --levels",
         "extrapolations 0",
         "speed-up bound 3.64 over",  # 1 / (0.1 * 50 / 100 + 0.9 * 0.25)
-        "energy drift -12.50%",
+        "energy dissipated 12.50% of 4 J at the start",
     ):
         assert fact in words
     report.print_table(simulation(rts.Regional(), [0.2, 0.8], [0.3, 0.7]), Energy(1.0, 2.0, 1.0))
     words = " ".join(capsys.readouterr().out.split())
     assert "speed-up bound 3.08 over" in words
     assert "pass" not in words
+
+
+def test_energy_gained_asks_for_shorter_steps():
+    start = Energy(1.0, 2.0, 1.0)
+    assert report.energy_fact(0.004, start) == "0.40% of 4 J at the start"
+    assert report.energy_fact(0.02, start) == "[bold yellow]2.00% of 4 J at the start[/]; use a smaller --courant"
+    assert report.energy_fact(0.02, start, known=False) == "2.00% of 4 J at the start"
 
 
 def test_speedup_bound_counts_the_passes_of_a_base_step():
