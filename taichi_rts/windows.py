@@ -235,10 +235,9 @@ class NeighbourSum:
                 finish(k, self.plain(k), self.other_walls(k), due, now, tick)
         else:
             for turn in range(TASKS * CHUNK):
-                task, blocks = turn // CHUNK, self.grid.geometry.blocks
-                block, end = self.share(task, blocks), self.share(task + 1, blocks)
-                if turn % CHUNK > 0:
-                    end = block
+                task, block, end = turn // CHUNK, 0, 0
+                if turn % CHUNK == 0:
+                    block, end = self.share(due, task), self.share(due, task + 1)
                 while block < end:
                     first, last = due.due_in(block)
                     if first < last:
@@ -247,9 +246,18 @@ class NeighbourSum:
                         block += 1
 
     @ti.func
-    def share(self, task, blocks):
-        """First block of a task."""
-        return ti.cast(ti.cast(task, ti.i64) * blocks // TASKS, ti.i32)
+    def share(self, due: ti.template(), task):
+        """First block of a task: each has as many due particles as the others, give or take a block's."""
+        wanted = ti.cast(ti.cast(task, ti.i64) * due.due_count[None] // TASKS, ti.i32)
+        low, high = 0, self.grid.geometry.blocks
+        while low < high:
+            middle = (low + high) // 2
+            first, _last = due.due_in(middle)
+            if first < wanted:
+                low = middle + 1
+            else:
+                high = middle
+        return low
 
     @ti.func
     def plain(self, k):

@@ -10,7 +10,7 @@ from taichi_rts.particles import Neighbourhood
 from taichi_rts.physics.walls import Walls
 from taichi_rts.sampling import WallLayer
 from taichi_rts.smoothing import make_kernel
-from taichi_rts.windows import FluidWindows, NeighbourSum, WallWindows
+from taichi_rts.windows import TASKS, FluidWindows, NeighbourSum, WallWindows
 
 SUPPORT = 0.25
 LOWER, UPPER = -0.1, 0.8
@@ -59,6 +59,7 @@ class Sums:
                 each.windows = WallWindows(each)
         self.kernel = make_kernel("cubic_spline", dim, SUPPORT)
         self.found = ti.Vector.field(2 * self.width, ti.f64, count)
+        self.shares = ti.field(ti.i32, TASKS + 1)
 
         @ti.func
         def both(x_ij):
@@ -103,6 +104,11 @@ class Sums:
     @ti.kernel
     def visit(self, due: ti.template()):
         self.sum.visit(self.note, due, 0, 0.0)
+
+    @ti.kernel
+    def share_out(self, due: ti.template()):
+        for task in self.shares:
+            self.shares[task] = self.sum.share(due, task)
 
     @ti.func
     def note(self, k, fluid, walls, due: ti.template(), now, tick):
@@ -170,3 +176,19 @@ def test_what_does_not_fit_into_a_window_is_summed_without(taichi_cpu_f64):
     sums = Sums(np.concatenate([cloud(2, 100), crowd]), None, wall_beside(2), per_block=8)
     assert sums.windows.capacity < 3000
     check(sums)
+
+
+@pytest.mark.parametrize("every", [1, 7])
+def test_tasks_share_out_the_due_not_the_blocks(taichi_cpu_f64, every):
+    low = np.random.default_rng(1).uniform(LOWER, (UPPER, UPPER, LOWER + 0.4), (2000, 3))
+    sums = Sums(np.concatenate([cloud(3, 20), low]), None)
+    due = Due(sums.grid, len(sums.x.to_numpy()), every)
+    sums.share_out(due)
+    shares, first = sums.shares.to_numpy(), due.first.to_numpy()
+    assert shares[0] == 0
+    assert (np.diff(shares) >= 0).all()
+    begins = first[shares]
+    assert begins[-1] == due.due_count[None]  # nobody is left out
+    fair = due.due_count[None] / TASKS + np.diff(first).max()
+    assert np.diff(begins).max() <= fair
+    assert np.diff(first[np.arange(TASKS + 1) * (len(first) - 1) // TASKS]).max() > 1.2 * fair  # the same of blocks
