@@ -96,10 +96,10 @@ def show(found):
         "stepper",
         "base steps",
         "energy gained",
-        "kinetic 1st | 2nd half",
-        "mean momentum",
+        "kinetic, 1st half, 2nd half",
+        "mean momentum x, y",
         "lost",
-        "MiB 10 % | end",
+        "MiB at 10 %, at the end",
     )
     for each in found.values():
         row(
