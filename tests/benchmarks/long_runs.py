@@ -94,7 +94,7 @@ def show(found):
     head(
         "scene",
         "stepper",
-        "base steps",
+        "time",
         "energy gained",
         "kinetic, 1st half, 2nd half",
         "mean momentum x, y",
@@ -105,7 +105,7 @@ def show(found):
         row(
             each["scene"],
             each["stepper"],
-            f"{each['base_steps']:,}",
+            f"{each['time']:.0f} s",
             f"{each['largest gain of energy']:.2e}",
             f"{each['kinetic energy, first half']:.1e}, {each['kinetic energy, second half']:.1e}",
             ", ".join(f"{value:.1e}" for value in each["mean momentum"]),
