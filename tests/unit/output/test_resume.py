@@ -205,6 +205,20 @@ def test_what_contradicts_the_checkpoint_is_refused(reference, capsys, args, wor
     assert sorted(reference.rglob("*")) == before
 
 
+def test_changes_of_the_clock_do_not_matter(copy, monkeypatch, wanted):
+    """What is newest follows from names; files may bear any date, and the clock may jump while it runs."""
+    for path in [copy / "run.json", *sorted((copy / "frames").iterdir())[-2:]]:
+        path.unlink()
+    for year, path in zip((2100, 1980, 1990), sorted((copy / "checkpoints").iterdir()), strict=True):
+        os.utime(path, (seconds := (year - 1970) * 365 * 86400, seconds))
+    newest(copy).unlink()
+    assert newest(copy).name == "000000.040000000.npz"
+    jumps, now = random.Random(5), time.time()
+    monkeypatch.setattr(time, "time", lambda: now + jumps.uniform(-1e8, 1e8))
+    assert command("run", "--resume", copy) == 0
+    assert files(copy) == wanted
+
+
 @pytest.mark.slow
 def test_overwrite_never_takes_the_checkpoint_away(copy, tmp_path, capsys, wanted):
     first = sorted((copy / "checkpoints").iterdir())[0]
