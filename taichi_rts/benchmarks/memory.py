@@ -12,8 +12,12 @@ BYTES = {ti.f32: 4, ti.f64: 8, ti.i32: 4}
 
 def memory_of(sim: rts.Simulation) -> dict[str, int]:
     """Return the bytes of every field that can be reached from `sim`, the largest first."""
-    sizes = {}
+    sizes: dict[str, int] = {}
+    counted: set[int] = set()
     for path, field in State(sim, everything=True).fields.items():
-        parts = field.n * field.m if isinstance(field, ti.MatrixField) else 1
-        sizes[path] = parts * BYTES[field.dtype] * math.prod(field.shape)
+        parts = {
+            id(part) for part in field._get_field_members()
+        } - counted  # a component may have a second path of its own
+        counted |= parts
+        sizes[path] = len(parts) * BYTES[field.dtype] * math.prod(field.shape)
     return dict(sorted(sizes.items(), key=lambda item: -item[1]))

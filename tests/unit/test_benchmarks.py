@@ -8,6 +8,7 @@ from taichi_rts.benchmarks.memory import memory_of
 from taichi_rts.benchmarks.rows import Row, Settings, millions
 from taichi_rts.benchmarks.scenes import peers_dam_break
 from taichi_rts.cli import main
+from taichi_rts.resources import device_bytes
 
 
 def test_a_step_with_few_due_is_read_off_a_line_that_disturbed_steps_do_not_bend():
@@ -47,6 +48,9 @@ def test_memory_counts_every_field_once(taichi_cpu, unstarted):
     assert sizes["particles.updated"] == 4 * sim.count
     assert list(sizes.values()) == sorted(sizes.values(), reverse=True)
     assert any(".inside." in path for path in sizes)  # windows
+    assert not any(size for path, size in sizes.items() if "real" in path)  # components of vectors, and others' fields
+    estimated = device_bytes(sim.scene, sim.stepper, "f32")
+    assert 0.8 * estimated < sum(sizes.values()) <= estimated
     assert Settings(scale=0.1).cells(60) == round(60 * 0.1 ** (1 / 3))
 
 
