@@ -22,6 +22,11 @@ def vector_field(dim: int, dtype: Any, count: int) -> ti.MatrixField:
     return ti.Vector.field(dim, dtype, count, layout=ti.Layout.SOA)
 
 
+def components(field: ti.MatrixField) -> list[ti.Field]:
+    """The scalar fields that a field of vectors is made of."""
+    return [field.get_scalar_field(d) for d in range(field.n)]
+
+
 def batches(fields: list[ti.Field], most: int) -> list[list[ti.Field]]:
     """Fields in order, at most `most` at a time."""
     return [fields[first : first + most] for first in range(0, len(fields), most)]
@@ -78,7 +83,7 @@ class Particles:
 
         def vector() -> ti.MatrixField:
             field = vector_field(self.dim, backend.dtype, self.capacity)
-            self.reals += [field.get_scalar_field(d) for d in range(self.dim)]
+            self.reals += components(field)
             return field
 
         def scalar() -> ti.Field:
@@ -115,13 +120,7 @@ class Particles:
         self.load(*start, rest_density)
 
     @ti.kernel
-    def load(
-        self,
-        x: Rows,
-        v: Rows,
-        rho: Values,
-        rest_density: float,
-    ):
+    def load(self, x: Rows, v: Rows, rho: Values, rest_density: float):
         """Begin with these, at rest density where nobody is yet; one kernel compiles quicker than many assignments."""
         for k in self.identity:
             self.identity[k] = k
@@ -223,8 +222,7 @@ class Neighbourhood:
     @property
     def spare(self) -> list[ti.Field]:
         """Fields that may be written to between steps, (capacity,) or more; a density of 0 would do harm."""
-        vectors = [field.get_scalar_field(d) for field in (self.x, self.v) for d in range(field.n)]
-        return [*vectors, self.p_over_rho2]
+        return [*components(self.x), *components(self.v), self.p_over_rho2]
 
     @ti.func
     def difference(self, i, j):

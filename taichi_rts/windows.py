@@ -15,7 +15,7 @@ import taichi as ti
 
 from taichi_rts.backend import Backend
 from taichi_rts.grid import CELLS_PER_BLOCK, MARGIN, BlockGrid, Geometry, make_neighbour_sum
-from taichi_rts.particles import Neighbourhood
+from taichi_rts.particles import Neighbourhood, components
 from taichi_rts.physics.walls import make_wall_sum
 
 TASKS = 64  # windows, and shares of the blocks that threads take one by one
@@ -47,8 +47,8 @@ class Windows:
         self.start = start
         self.rows = 3 ** (geometry.dim - 1)
         self.row_count = ti.field(ti.i32, ())
+        """`rows` as a loop bound LLVM does not know: it would unroll the loop, which takes three times as long to compile."""
         self.row_count[None] = self.rows
-        """As a field, since a loop over a constant few rows would be unrolled: three times as long to compile, and no quicker."""
         self.capacity = capacity
         self.size = capacity + VECTOR
         self.entries = entries(capacity)
@@ -67,8 +67,8 @@ class Windows:
             if isinstance(one, ti.MatrixField):
                 place = name == "x"
                 found += [
-                    (one.get_scalar_field(d), two.get_scalar_field(d), self.far if place else 0.0, d if place else -1)
-                    for d in range(one.n)
+                    (of, to, self.far if place else 0.0, d if place else -1)
+                    for d, (of, to) in enumerate(zip(components(one), components(two), strict=True))
                 ]
             else:
                 found.append((one, two, 1.0 if name == "rho" else 0.0, -1))
@@ -110,10 +110,8 @@ class Windows:
                 for k in range(first, last):
                     for field, copy, _nobody, axis in ti.static(copies):
                         if ti.static(axis >= 0 and self.geometry.periodic[axis]):
-                            middle, length = (
-                                self.middle(row, column, above, axis),
-                                ti.static(self.geometry.lengths[axis]),
-                            )
+                            middle = self.middle(row, column, above, axis)
+                            length = ti.static(self.geometry.lengths[axis])
                             beside = field[k] - middle  # the image that lies where the window does
                             copy[n + k - first] = middle + beside - length * ti.floor(beside / length + 0.5)
                         else:

@@ -15,9 +15,8 @@ def memory_of(sim: rts.Simulation) -> dict[str, int]:
     sizes: dict[str, int] = {}
     counted: set[int] = set()
     for path, field in State(sim, everything=True).fields.items():
-        parts = {
-            id(part) for part in field._get_field_members()
-        } - counted  # a component may have a second path of its own
+        # Without components that have been found under another path.
+        parts = {id(part) for part in field._get_field_members()} - counted
         counted |= parts
         sizes[path] = len(parts) * BYTES[field.dtype] * math.prod(field.shape)
     return dict(sorted(sizes.items(), key=lambda item: -item[1]))

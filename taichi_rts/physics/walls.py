@@ -58,14 +58,8 @@ class Walls:
         self.load(*sorted_, start.astype(np.int32), near.astype(np.int32))
 
     @ti.kernel
-    def load(
-        self,
-        x: Rows,
-        volume: Values,
-        normal: Rows,
-        start: Values,
-        near: Values,
-    ):
+    def load(self, x: Rows, volume: Values, normal: Rows, start: Values, near: Values):
+        """Take these over; one kernel compiles quicker than many assignments."""
         for b in range(x.shape[0]):
             self.volume[b] = volume[b]
             for d in ti.static(range(self.x.n)):

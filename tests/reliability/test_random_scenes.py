@@ -126,7 +126,7 @@ def test_the_same_of_fewer_scenes(folder, text):
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @given(text=st.one_of(mutated_json(), mutated_json(), mutated_json(), garbled(st.just(foreign_text))))
-@attempts(150)
+@attempts(300)
 def test_the_same_of_scenes_of_splishsplash(folder, text):
     check(folder / "scene.json", text)
 

@@ -27,7 +27,6 @@ STEPPERS = {
     "aligned": rts.Regional(levels=4, steps="powers_of_two"),
     "asynchronous": rts.Asynchronous(stagger=1),
 }
-each_stepper = pytest.mark.parametrize("stepper", STEPPERS.values(), ids=STEPPERS)
 
 
 def drop(dim, **changes):
@@ -74,7 +73,7 @@ def test_a_box_without_extent_is_refused_and_a_file_may_hold_one(tmp_path):
 
 
 @pytest.mark.slow
-@each_stepper
+@pytest.mark.parametrize("stepper", STEPPERS.values(), ids=STEPPERS)
 def test_as_much_flows_out_as_in(simulate, stepper):
     sim = simulate(CHANNEL, stepper, debug=True)
     start, energy, mass = sim.count, sim.energy().total, sim.medium.mass

@@ -182,7 +182,7 @@ def test_what_does_not_fit_into_a_window_is_summed_without(taichi_cpu_f64):
 def test_tasks_share_out_the_due_not_the_blocks(taichi_cpu_f64, every):
     low = np.random.default_rng(1).uniform(LOWER, (UPPER, UPPER, LOWER + 0.4), (2000, 3))
     sums = Sums(np.concatenate([cloud(3, 20), low]), None)
-    due = Due(sums.grid, len(sums.x.to_numpy()), every)
+    due = Due(sums.grid, sums.x.shape[0], every)
     sums.share_out(due)
     shares, first = sums.shares.to_numpy(), due.first.to_numpy()
     assert shares[0] == 0

@@ -44,12 +44,13 @@ def stop_in_the_middle(sim, time):
     sim.stop_asked = lambda: False
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(  # all six: python tests/benchmarks/faults.py
     ("name", "precision"),
     [
-        pytest.param("uniform", "f32", marks=pytest.mark.slow),
-        pytest.param("regional", "f64", marks=pytest.mark.slow),
-        pytest.param("asynchronous", "f32", marks=pytest.mark.slow),
+        ("uniform", "f32"),
+        ("regional", "f64"),
+        ("asynchronous", "f32"),
     ],
 )
 def test_the_same_bits_as_without_a_stop(start_taichi, quick, tmp_path, name, precision):
