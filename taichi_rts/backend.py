@@ -89,6 +89,11 @@ def current() -> Backend:
     return _current
 
 
+def threads() -> int:
+    """Threads that kernels run on with arch cpu; `ti.global_thread_idx()` is less."""
+    return int(ti.lang.impl.default_cfg().cpu_max_num_threads)
+
+
 def available() -> dict[str, str]:
     """Say for each arch whether it can be used here, without starting it."""
     ti.set_logging_level(ti.ERROR)  # looking for CUDA warns where there is none
@@ -111,12 +116,39 @@ def _start(name: str, precision: str, options: dict[str, Any]) -> bool:
     if name == "vulkan" and not vulkan_device_types():
         return False
     settings = {"log_level": ti.ERROR, "enable_fallback": False} | options
+    others = _thread_ids()
     try:
         with contextlib.redirect_stdout(io.StringIO()):  # its banner would break progress bars and piped output
             ti.init(arch=getattr(ti, name), default_fp=PRECISIONS[precision][0], default_ip=ti.i32, **settings)
     except RuntimeError:
         return False
+    if name == "cpu":
+        _pin_threads(sorted(_thread_ids() - others))
     return True
+
+
+def _thread_ids() -> set[int]:
+    """Ids of the threads of this process; empty where only Linux could say."""
+    try:
+        return {int(entry) for entry in os.listdir("/proc/self/task")}
+    except OSError:
+        return set()
+
+
+def _pin_threads(started: list[int]) -> None:
+    """Give every thread of Taichi's pool, the last of those that `ti.init` has `started`, a core of its own.
+
+    They sleep between loops, and Linux wakes them on the core that they were woken from: two threads then share one core for
+    milliseconds, longer than most kernels take (docs/speed.md). Only if there is a thread for every core that the process may use: fewer
+    threads are for sharing the machine, and must be free to move.
+    """
+    if not hasattr(os, "sched_setaffinity") or os.environ.get("TAICHI_RTS_PIN", "1") == "0":
+        return
+    cores = sorted(os.sched_getaffinity(0))
+    if len(cores) == threads() <= len(started):
+        for thread, core in zip(started[-len(cores) :], cores, strict=True):
+            with contextlib.suppress(OSError):  # a thread that has ended, or a sandbox that forbids it
+                os.sched_setaffinity(thread, {core})
 
 
 def has_vulkan_hardware() -> bool:

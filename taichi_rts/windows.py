@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from taichi_rts.backend import Backend
+from taichi_rts.backend import Backend, threads
 from taichi_rts.grid import CELLS_PER_BLOCK, MARGIN, BlockGrid, Geometry, make_neighbour_sum
 from taichi_rts.particles import Neighbourhood, components
 from taichi_rts.physics.walls import make_wall_sum
 
-TASKS = 64  # windows, and shares of the blocks that threads take one by one
+TASKS = 64  # shares of the due particles that threads take one by one
 CHUNK = 512  # iterations that Taichi gives to a thread at a time, whatever `block_dim` says: one of them does a task
 RUN = 16  # most blocks that share a window
 VECTOR = 16  # loops go on to a multiple of it; who lies there is too far away to count
@@ -32,13 +32,16 @@ def room(dim: int, per_block: float) -> int:
 
 
 def entries(capacity: int) -> int:
-    """Entries of all windows together, of which each has room for `capacity` particles."""
-    return TASKS * (capacity + VECTOR)
+    """Entries of the windows of all threads together, of which each has room for `capacity` particles."""
+    return threads() * (capacity + VECTOR)
 
 
 @ti.data_oriented
 class Windows:
-    """`TASKS` windows on what `start` has sorted into cells; each has room for `capacity` entries."""
+    """A window for every thread on what `start` has sorted into cells; each has room for `capacity` entries.
+
+    One for every thread, not for every task, because it then stays in that core's cache.
+    """
 
     transient = frozenset({"start", "column_start", "own_start"})
 
@@ -53,9 +56,9 @@ class Windows:
         self.size = capacity + VECTOR
         self.entries = entries(capacity)
         self.columns = (RUN + 2) * CELLS_PER_BLOCK + 1
-        self.column_start = ti.field(ti.i32, TASKS * self.columns)
+        self.column_start = ti.field(ti.i32, threads() * self.columns)
         """First entry of each column of a window; the next one's ends it."""
-        self.own_start = ti.field(ti.i32, TASKS * self.columns)
+        self.own_start = ti.field(ti.i32, threads() * self.columns)
         """First entry of those in the run's own row."""
         self.far = geometry.upper[0] + FAR * geometry.reach
 
@@ -234,12 +237,13 @@ class NeighbourSum:
         else:
             for turn in range(TASKS * CHUNK):
                 task, block, end = turn // CHUNK, 0, 0
+                thread = ti.global_thread_idx()
                 if turn % CHUNK == 0:
                     block, end = self.share(due, task), self.share(due, task + 1)
                 while block < end:
                     first, last = due.due_in(block)
                     if first < last:
-                        block = self.visit_run(finish, due, now, tick, task, block, end)
+                        block = self.visit_run(finish, due, now, tick, thread, block, end)
                     else:
                         block += 1
 
@@ -263,12 +267,12 @@ class NeighbourSum:
         return self.plain_fluid(k, self.near.x[k], self.grid.cell_of[self.grid.order[k]])
 
     @ti.func
-    def visit_run(self, finish: ti.template(), due: ti.template(), now, tick, task, block, end):
+    def visit_run(self, finish: ti.template(), due: ti.template(), now, tick, thread, block, end):
         """Visit the due particles of `block` and of the blocks behind it as far as a window reaches; return who comes next."""
         row, column = block // self.grid.geometry.shape[0], block % self.grid.geometry.shape[0]
-        held = self.open(due, task, row, column, end - block)
+        held = self.open(due, thread, row, column, end - block)
         done = ti.max(held - 2, 1)
-        number = task * self.windows.columns
+        number = thread * self.windows.columns
         for ahead in range(done):
             first, last = due.due_in(block + ahead)
             cell = (block + ahead) * CELLS_PER_BLOCK
@@ -296,13 +300,13 @@ class NeighbourSum:
         return block + done
 
     @ti.func
-    def open(self, due: ti.template(), task, row, column, most):
+    def open(self, due: ti.template(), thread, row, column, most):
         """Gather who lies around the run of at most `most` blocks in which somebody is due, from `column` of `row` on.
 
         Return the number of columns [blocks] gathered, from that before the run to that behind it; fewer than 3 if the fluid
         around a single block does not fit.
         """
-        base, number = task * self.windows.size, task * self.windows.columns
+        base, number = thread * self.windows.size, thread * self.windows.columns
         n, held = base, 0
         most = ti.min(most, ti.min(RUN, self.grid.geometry.shape[0] - 1 - column))
         fits = True
@@ -321,7 +325,7 @@ class NeighbourSum:
             for ahead in range(ti.max(held - 2, 1)):
                 some += self.wall.near[row * self.grid.geometry.shape[0] + column + ahead]
             if some > 0:
-                m = task * self.wall.windows.size
+                m = thread * self.wall.windows.size
                 for side in range(ti.max(held, 3)):
                     m = self.wall.windows.gather(
                         self.wall_copies, row, column - 1 + side, number + side * CELLS_PER_BLOCK, m
