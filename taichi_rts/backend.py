@@ -24,6 +24,8 @@ _REMEDIES = {
     "vulkan": "install a Vulkan driver (Debian: apt-get install libvulkan1 mesa-vulkan-drivers), or use --arch cpu",
     "cpu": "reinstall taichi for this platform",
 }
+CHUNK = 512
+"""Iterations of a loop that Taichi gives to a CPU thread at a time, whatever `block_dim` says; shorter loops run in one."""
 _VK_DEVICE_TYPE_CPU = 4  # VkPhysicalDeviceType of a software rasteriser such as Mesa's lavapipe
 
 
@@ -94,6 +96,11 @@ def threads() -> int:
     return int(ti.lang.impl.default_cfg().cpu_max_num_threads)
 
 
+def on_cpu() -> bool:
+    """Whether kernels run on the CPU, where a short loop is quicker in one thread than waking the others."""
+    return bool(ti.lang.impl.current_cfg().arch == ti.cpu)
+
+
 def available() -> dict[str, str]:
     """Say for each arch whether it can be used here, without starting it."""
     ti.set_logging_level(ti.ERROR)  # looking for CUDA warns where there is none
@@ -139,8 +146,8 @@ def _pin_threads(started: list[int]) -> None:
     """Give every thread of Taichi's pool, the last of those that `ti.init` has `started`, a core of its own.
 
     They sleep between loops, and Linux wakes them on the core that they were woken from: two threads then share one core for
-    milliseconds, longer than most kernels take (docs/speed.md). Only if there is a thread for every core that the process may use: fewer
-    threads are for sharing the machine, and must be free to move.
+    milliseconds, longer than most kernels take (docs/speed.md). Only if there is a thread for every core that the process may
+    use: fewer threads are for sharing the machine, and must be free to move. TAICHI_RTS_PIN=0 in the environment turns it off.
     """
     if not hasattr(os, "sched_setaffinity") or os.environ.get("TAICHI_RTS_PIN", "1") == "0":
         return

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from taichi_rts.backend import Backend
+from taichi_rts.backend import Backend, on_cpu
 from taichi_rts.scan import ExclusiveScan
 
 CELLS_PER_BLOCK = 2  # measured: 1, 2, 4, 8 cells take 225, 203, 269, 321 ns per particle and core in a density pass
@@ -175,13 +175,14 @@ class Geometry:
 class BlockGrid:
     """Sorts the `alive[None]` first of up to `count` particles (all, if `alive` is None) into cells.
 
-    `order[k]` is the particle at place k; cell c holds places `start[c] .. start[c+1]`.
+    `order[k]` is the particle at place k; cell c holds places `start[c] .. start[c+1]`. `occupied` lists the blocks that hold
+    somebody, ascending, `occupied_count[None]` of them; `vacated`, likewise, those that no longer do since the last update.
 
     Within a cell particles stand in order of their id, so the result depends on positions alone: not on threads, not on
     history. Work: two passes over the particles, two over the cells.
     """
 
-    transient = frozenset({"rank", "cell_count"})
+    transient = frozenset({"rank", "cell_count", "vacated", "vacated_count", "occupied_flag", "occupied_start"})
 
     def __init__(self, geometry: Geometry, count: int, alive: ti.Field | None = None) -> None:
         self.geometry = geometry
@@ -195,6 +196,17 @@ class BlockGrid:
         self.cell_count = ti.field(ti.i32, geometry.cells)
         self.start = ti.field(ti.i32, geometry.cells + 1)
         self.scan = ExclusiveScan(self.cell_count, self.start)
+        self.occupied = ti.field(ti.i32, geometry.blocks)
+        self.vacated = ti.field(ti.i32, geometry.blocks)
+        self.vacated_count = ti.field(ti.i32, ())
+        self.serial = on_cpu()
+        if self.serial:
+            self.occupied_count = ti.field(ti.i32, ())
+        else:
+            self.occupied_flag = ti.field(ti.i32, geometry.blocks)
+            self.occupied_start = ti.field(ti.i32, geometry.blocks + 1)
+            self.occupied_scan = ExclusiveScan(self.occupied_flag, self.occupied_start)
+            self.occupied_count = self.occupied_scan.total
         self.tracks_arrivals = False
 
     def track_arrivals(self) -> None:
@@ -208,7 +220,6 @@ class BlockGrid:
     def update(self, locate: Callable[..., Any], identity: ti.Field, *time: Any) -> None:
         """Sort anew. `locate(*time)` is a kernel that calls `insert` once for every particle."""
         locate(*time)
-        self.scan.run()
         self.place_particles(identity)
 
     @ti.func
@@ -224,20 +235,78 @@ class BlockGrid:
         self.rank[i] = ti.atomic_add(self.cell_count[cell], 1)
 
     @ti.kernel
-    def place_particles(self, identity: ti.template()):  # two loops in one kernel: a launch costs as much as the first
+    def place_particles(
+        self, identity: ti.template()
+    ):  # many loops in one kernel: a launch costs more than some of them
+        self.scan.scan()
         for i in range(self.alive[None]):
             self.order[self.start[self.cell_of[i]] + self.rank[i]] = i
-        for c in range(self.geometry.cells):
-            self.cell_count[c] = 0  # for the next update
-            first = self.start[c]
-            for k in range(first + 1, self.start[c + 1]):  # insertion sort: a cell holds a handful
-                particle = self.order[k]
-                key = identity[particle]
-                m = k - 1
-                while m >= first and identity[self.order[m]] > key:
-                    self.order[m + 1] = self.order[m]
-                    m -= 1
-                self.order[m + 1] = particle
+        self.list_vacated()
+        self.list_occupied()
+        for m in range(self.occupied_count[None]):
+            for part in range(CELLS_PER_BLOCK):
+                self.sort_cell(identity, self.occupied[m] * CELLS_PER_BLOCK + part)
+
+    @ti.func
+    def sort_cell(self, identity: ti.template(), cell):
+        """Bring the particles of a cell into the order of their ids."""
+        self.cell_count[cell] = 0  # for the next update
+        first = self.start[cell]
+        for k in range(first + 1, self.start[cell + 1]):  # insertion sort: a cell holds a handful
+            particle = self.order[k]
+            key = identity[particle]
+            m = k - 1
+            while m >= first and identity[self.order[m]] > key:
+                self.order[m + 1] = self.order[m]
+                m -= 1
+            self.order[m + 1] = particle
+
+    @ti.func
+    def list_vacated(self):
+        """Find the blocks that were occupied and no longer are."""
+        if ti.static(self.serial):
+            ti.loop_config(serialize=True)
+            for _ in range(1):
+                gone = 0
+                for m in range(self.occupied_count[None]):
+                    if self.is_empty(self.occupied[m]):
+                        self.vacated[gone] = self.occupied[m]
+                        gone += 1
+                self.vacated_count[None] = gone
+        else:
+            self.vacated_count[None] = 0
+            for m in range(self.occupied_count[None]):
+                if self.is_empty(self.occupied[m]):
+                    self.vacated[ti.atomic_add(self.vacated_count[None], 1)] = self.occupied[m]
+
+    @ti.func
+    def list_occupied(self):
+        """Find the blocks that are occupied."""
+        if ti.static(self.serial):
+            ti.loop_config(serialize=True)
+            for _ in range(1):
+                count = 0
+                for row in range(self.geometry.blocks // self.geometry.shape[0]):
+                    cell = row * self.geometry.row_length
+                    if self.start[cell] < self.start[cell + self.geometry.row_length]:
+                        for column in range(self.geometry.shape[0]):
+                            block = row * self.geometry.shape[0] + column
+                            if not self.is_empty(block):
+                                self.occupied[count] = block
+                                count += 1
+                self.occupied_count[None] = count
+        else:
+            for block in range(self.geometry.blocks):
+                self.occupied_flag[block] = ti.cast(not self.is_empty(block), ti.i32)
+            self.occupied_scan.scan()
+            for block in range(self.geometry.blocks):
+                if self.occupied_flag[block] == 1:
+                    self.occupied[self.occupied_start[block]] = block
+
+    @ti.func
+    def is_empty(self, block):
+        """Whether a block held nobody at the last update."""
+        return self.first(block) == self.first(block + 1)
 
     @ti.func
     def block(self, i):

@@ -128,7 +128,8 @@ class Motion:
     @ti.kernel
     def predict_neighbourhood(self, read_at: ti.template(), now: ti.i32, tick: float):
         """Lines 25-26, for all particles in blocks that a due particle may read, and for no others."""
-        for block in read_at:
+        for m in range(self.grid.occupied_count[None]):
+            block = self.grid.occupied[m]
             if read_at[block] >= 0:
                 for k in range(self.grid.first(block), self.grid.first(block + 1)):
                     i = self.grid.order[k]

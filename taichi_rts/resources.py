@@ -29,13 +29,13 @@ LINING = 10 * SAMPLING
 """Bytes of the host per boundary particle of an obstacle and dimension: they are chosen from about ten times as many points."""
 COMPILED = 400 << 20
 """Bytes that Python, the compiler and compiled kernels take besides."""
-BLOCK_INTEGERS = {"uniform": 1, "regional": 7, "asynchronous": 11}
+BLOCK_INTEGERS = {"uniform": 3, "regional": 9, "asynchronous": 10}
 """Fields of 32-bit integers that each stepper has with an entry for each block."""
 FIXED = 1 << 17
 """Bytes of fields whose size does not depend on the scene, about."""
 WALL_SHARE = 0.45
 """Entries of the windows on a wall at rest over those of the windows on the fluid, about."""
-SOUND_REALS = 10
+SOUND_REALS = 9
 """Fields of reals with an entry for each block that a regional sound speed needs."""
 FINEST_POSITION = 0.01
 """Share of the spacing that positions must at least be told apart by."""

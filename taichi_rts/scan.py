@@ -27,10 +27,15 @@ class ExclusiveScan:
 
     def run(self) -> None:
         """Fill `starts` and `total` from `counts`."""
-        self.scan()
+        self.run_alone()
 
     @ti.kernel
-    def scan(self):  # three loops in one kernel: a launch costs as much as each of them
+    def run_alone(self):
+        self.scan()
+
+    @ti.func
+    def scan(self):
+        """Do the same at the outermost level of a kernel: a launch costs as much as each of the loops."""
         for c in range(self.chunks):
             total = 0
             for k in range(c * self.chunk, ti.min((c + 1) * self.chunk, self.n)):

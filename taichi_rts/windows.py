@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from taichi_rts.backend import Backend, threads
+from taichi_rts.backend import CHUNK, Backend, threads
 from taichi_rts.grid import CELLS_PER_BLOCK, MARGIN, BlockGrid, Geometry, make_neighbour_sum
 from taichi_rts.particles import Neighbourhood, components
 from taichi_rts.physics.walls import make_wall_sum
 
 TASKS = 64  # shares of the due particles that threads take one by one
-CHUNK = 512  # iterations that Taichi gives to a thread at a time, whatever `block_dim` says: one of them does a task
 RUN = 16  # most blocks that share a window
 VECTOR = 16  # loops go on to a multiple of it; who lies there is too far away to count
 ROOM = 1.5  # of a window, over what lies around a run of blocks at rest
@@ -235,23 +234,23 @@ class NeighbourSum:
                 k = due.due[n]
                 finish(k, self.plain(k), self.other_walls(k), due, now, tick)
         else:
-            for turn in range(TASKS * CHUNK):
-                task, block, end = turn // CHUNK, 0, 0
+            for turn in range(TASKS * CHUNK):  # the first iteration of each chunk does a task
+                task, m, end = turn // CHUNK, 0, 0
                 thread = ti.global_thread_idx()
                 if turn % CHUNK == 0:
-                    block, end = self.share(due, task), self.share(due, task + 1)
-                while block < end:
-                    first, last = due.due_in(block)
+                    m, end = self.share(due, task), self.share(due, task + 1)
+                while m < end:
+                    first, last = due.due_in(m)
                     if first < last:
-                        block = self.visit_run(finish, due, now, tick, thread, block, end)
+                        m = self.visit_run(finish, due, now, tick, thread, m, end)
                     else:
-                        block += 1
+                        m += 1
 
     @ti.func
     def share(self, due: ti.template(), task):
-        """First block of a task: each has as many due particles as the others, give or take a block's."""
+        """Number of a task's first occupied block: each has as many due particles as the others, give or take a block's."""
         wanted = ti.cast(ti.cast(task, ti.i64) * due.due_count[None] // TASKS, ti.i32)
-        low, high = 0, self.grid.geometry.blocks
+        low, high = 0, self.grid.occupied_count[None]
         while low < high:
             middle = (low + high) // 2
             first, _last = due.due_in(middle)
@@ -267,18 +266,22 @@ class NeighbourSum:
         return self.plain_fluid(k, self.near.x[k], self.grid.cell_of[self.grid.order[k]])
 
     @ti.func
-    def visit_run(self, finish: ti.template(), due: ti.template(), now, tick, thread, block, end):
-        """Visit the due particles of `block` and of the blocks behind it as far as a window reaches; return who comes next."""
+    def visit_run(self, finish: ti.template(), due: ti.template(), now, tick, thread, m, end):
+        """Visit the due particles of occupied block number `m` and of those behind it as far as a window reaches.
+
+        Return who comes next.
+        """
+        block = self.grid.occupied[m]
         row, column = block // self.grid.geometry.shape[0], block % self.grid.geometry.shape[0]
-        held = self.open(due, thread, row, column, end - block)
+        held = self.open(due, thread, row, column, m, end - m)
         done = ti.max(held - 2, 1)
         number = thread * self.windows.columns
         for ahead in range(done):
-            first, last = due.due_in(block + ahead)
+            first, last = due.due_in(m + ahead)
             cell = (block + ahead) * CELLS_PER_BLOCK
             local = number + (ahead + 1) * CELLS_PER_BLOCK
-            for m in range(first, last):
-                k = due.due[m]
+            for n in range(first, last):
+                k = due.due[n]
                 while k >= self.grid.start[cell + 1]:
                     cell += 1
                     local += 1
@@ -297,11 +300,13 @@ class NeighbourSum:
                         for b in range(low, high):
                             walls += self.wall_pair(k, b)
                 finish(k, fluid, walls, due, now, tick)
-        return block + done
+        return m + done
 
     @ti.func
-    def open(self, due: ti.template(), thread, row, column, most):
+    def open(self, due: ti.template(), thread, row, column, m, most):
         """Gather who lies around the run of at most `most` blocks in which somebody is due, from `column` of `row` on.
+
+        The first is occupied block number `m`.
 
         Return the number of columns [blocks] gathered, from that before the run to that behind it; fewer than 3 if the fluid
         around a single block does not fit.
@@ -315,8 +320,8 @@ class NeighbourSum:
             held += 1
             fits = held < 3
             if held >= 3 and held - 2 < most:
-                first, last = due.due_in(row * self.grid.geometry.shape[0] + column + held - 2)
-                fits = first < last
+                first, last = due.due_in(m + held - 2)
+                fits = first < last and self.grid.occupied[m + held - 2] == self.grid.occupied[m] + held - 2
             if fits:
                 fits = n - base + self.windows.count(row, column - 1 + held) <= self.windows.capacity
         self.windows.close(self.copies, number + held * CELLS_PER_BLOCK, n)
@@ -325,10 +330,10 @@ class NeighbourSum:
             for ahead in range(ti.max(held - 2, 1)):
                 some += self.wall.near[row * self.grid.geometry.shape[0] + column + ahead]
             if some > 0:
-                m = thread * self.wall.windows.size
+                end = thread * self.wall.windows.size
                 for side in range(ti.max(held, 3)):
-                    m = self.wall.windows.gather(
-                        self.wall_copies, row, column - 1 + side, number + side * CELLS_PER_BLOCK, m
+                    end = self.wall.windows.gather(
+                        self.wall_copies, row, column - 1 + side, number + side * CELLS_PER_BLOCK, end
                     )
-                self.wall.windows.close(self.wall_copies, number + ti.max(held, 3) * CELLS_PER_BLOCK, m)
+                self.wall.windows.close(self.wall_copies, number + ti.max(held, 3) * CELLS_PER_BLOCK, end)
         return held

@@ -10,6 +10,7 @@ from taichi_rts.physics.equation_of_state import tait
 from taichi_rts.scene import Scene
 from taichi_rts.stepping import criteria
 from taichi_rts.stepping.limits import BlockMaxima
+from taichi_rts.surroundings import Surroundings
 
 SLACK = 2.0
 """How many times what the pressure asks for a sound speed may be before it falls.
@@ -46,6 +47,7 @@ class SoundRule:
         self.grid = grid
         self.geometry = grid.geometry
         self.maxima = BlockMaxima(scene, particles, grid)
+        self.around = Surroundings(grid)
         self.cap = scene.wave_speed
         self.floor = scene.least_wave_speed
         self.rest_density = scene.rest_density
@@ -61,7 +63,6 @@ class SoundRule:
         """The largest sound speed of its particles, as compressed as they are."""
         self.felt = ti.field(float, self.blocks)
         """What its neighbours notice of it: its wish, and half of its target."""
-        self.fresh = ti.field(float, self.blocks)
         self.target = ti.field(float, self.blocks)
         self.ceiling = ti.field(float, self.blocks)
         self.limit = ti.field(float, self.blocks)
@@ -79,75 +80,75 @@ class SoundRule:
 
     def update_some(self, cells: Any, tick: float) -> None:
         """Do the same for the cells that have just stepped (`stepping.cells.Cells`), each at its own time, and those beside."""
-        self.work_out_some(cells.occupied, cells.occupied_count, cells.block_due, cells.time, cells.read_at, tick)
+        self.work_out_some(cells.block_due, cells.time, cells.read_at, tick)
 
     @ti.kernel
     def work_out(
         self, read_at: ti.template(), now: ti.i32, tick: float
     ):  # one kernel, for launches cost more than the last loops
-        for block in range(self.blocks):
+        for m in range(self.grid.vacated_count[None]):
+            self.forget(self.grid.vacated[m])
+        for m in range(self.grid.occupied_count[None]):
+            block = self.grid.occupied[m]
             if self.is_stale(block, read_at[block]):
                 self.look_at(block, now, tick)
             self.felt[block] = ti.max(self.wish[block], 0.5 * self.target[block])
-        for block in range(self.blocks):
-            self.spread_to(block)
-        for block in range(self.blocks):
-            self.take_over(block)
+        self.around.visit(self, False, ti.Vector([0.0, 0.0]))
 
     @ti.kernel
     def work_out_some(
         self,
-        cells: ti.template(),
-        count: ti.template(),
         due: ti.template(),
         time: ti.template(),
         read_at: ti.template(),
         tick: float,
     ):
-        for m in range(count[None]):
-            if due[cells[m]] > 0:
-                self.look_at(cells[m], time[cells[m]], tick)
-            self.felt[cells[m]] = ti.max(self.wish[cells[m]], 0.5 * self.target[cells[m]])
-        for m in range(count[None]):
-            if read_at[cells[m]] >= 0:
-                self.spread_to(cells[m])
-        for m in range(count[None]):
-            if read_at[cells[m]] >= 0:
-                self.take_over(cells[m])
+        for m in range(self.grid.occupied_count[None]):
+            block = self.grid.occupied[m]
+            if due[block] > 0:
+                self.look_at(block, time[block], tick)
+            self.felt[block] = ti.max(self.wish[block], 0.5 * self.target[block])
+        for m in range(self.grid.occupied_count[None]):
+            block = self.grid.occupied[m]
+            if read_at[block] >= 0:
+                around = ti.Vector([0.0, 0.0])
+                for k in ti.static(range(len(self.geometry.offsets))):
+                    around = ti.max(around, self.read(self.geometry.beside(block, k)))
+                self.finish(block, around)
 
     @ti.func
     def is_stale(self, block, read_at):
-        """Whether what is known of a block may have changed since it was looked at."""
-        stale = read_at >= 0 or (self.wish[block] > 0.0) != (self.grid.first(block) < self.grid.first(block + 1))
+        """Whether what is known of an occupied block may have changed since it was looked at."""
+        stale = read_at >= 0 or self.wish[block] == 0.0
         if ti.static(self.grid.tracks_arrivals):
             stale = stale or self.grid.arrived[block] > 0
         return stale
 
     @ti.func
     def look_at(self, block, now, tick):
-        """Work out what a block needs for itself at tick `now`, 0 if it is empty, and its largest sound speed."""
+        """Work out what an occupied block needs for itself at tick `now`, and its largest sound speed."""
         first, end = self.grid.first(block), self.grid.first(block + 1)
-        wish, wish_ceiling, own = 0.0, 0.0, 0.0
-        acceleration2, viscosity = 0.0, 0.0 if ti.static(self.particles.has_viscosity) else self.maxima.viscosity
-        if first < end:
-            p = self.particles
-            speed2, pressure = self.maxima.wall_speed2(block, now, tick), 0.0
-            for k in range(first, end):
-                i = self.grid.order[k]
-                a = p.a[i]
-                v = p.v[i] + a * (ti.cast(now - p.updated[i], float) * tick)
-                speed2 = ti.max(speed2, v.norm_sqr())
-                acceleration2 = ti.max(acceleration2, a.norm_sqr())
-                ratio, c2 = p.rho[i] / p.reference[i], p.sound[i] * p.sound[i]
-                own = ti.max(own, p.sound[i] * criteria.stiffening(ratio))
-                pressure += ti.max(0.0, tait(self.rest_density / 7.0 * c2, ratio))
-                if ti.static(p.has_viscosity):
-                    viscosity = ti.max(viscosity, p.viscosity[i])
-            mean = pressure / (ti.cast(end - first, float) * self.rest_density)
-            wish = self.within(ti.max(speed2, mean))
-            wish_ceiling = self.within(ti.max(speed2, SLACK * SLACK * mean))
-        self.wish[block] = wish
-        self.wish_ceiling[block] = wish_ceiling
+        own, acceleration2, viscosity = (
+            0.0,
+            0.0,
+            0.0 if ti.static(self.particles.has_viscosity) else self.maxima.viscosity,
+        )
+        p = self.particles
+        speed2, pressure = self.maxima.wall_speed2(block, now, tick), 0.0
+        for k in range(first, end):
+            i = self.grid.order[k]
+            a = p.a[i]
+            v = p.v[i] + a * (ti.cast(now - p.updated[i], float) * tick)
+            speed2 = ti.max(speed2, v.norm_sqr())
+            acceleration2 = ti.max(acceleration2, a.norm_sqr())
+            ratio, c2 = p.rho[i] / p.reference[i], p.sound[i] * p.sound[i]
+            own = ti.max(own, p.sound[i] * criteria.stiffening(ratio))
+            pressure += ti.max(0.0, tait(self.rest_density / 7.0 * c2, ratio))
+            if ti.static(p.has_viscosity):
+                viscosity = ti.max(viscosity, p.viscosity[i])
+        mean = pressure / (ti.cast(end - first, float) * self.rest_density)
+        self.wish[block] = self.within(ti.max(speed2, mean))
+        self.wish_ceiling[block] = self.within(ti.max(speed2, SLACK * SLACK * mean))
         self.own[block] = own
         self.acceleration2[block] = acceleration2
         self.viscosity[block] = viscosity
@@ -158,19 +159,23 @@ class SoundRule:
         return ti.min(ti.max(ti.sqrt(speed2 * self.inverse_mach2), self.floor), self.cap)
 
     @ti.func
-    def spread_to(self, block):
-        """Work out the new target of a block from its own wish, its neighbours', and half of their present targets."""
-        target, ceiling = self.wish[block], self.wish_ceiling[block]
-        if target > 0.0:
-            for k in ti.static(range(len(self.geometry.offsets))):
-                other = self.geometry.beside(block, k)
-                target = ti.max(target, self.felt[other])
-                ceiling = ti.max(ceiling, self.wish_ceiling[other])
-        self.fresh[block] = target
-        self.ceiling[block] = ti.max(target, ceiling)
+    def read(self, block):
+        """What neighbours see of `block`."""
+        return ti.Vector([self.felt[block], self.wish_ceiling[block]])
 
     @ti.func
-    def take_over(self, block):
-        """Make the new target the present one."""
-        self.target[block] = self.fresh[block]
-        self.limit[block] = ti.max(self.fresh[block], self.own[block])
+    def finish(self, block, around):
+        """Work out the new target of an occupied block from its own wish and from what is seen of those `around` it.
+
+        That is their wishes, and half of their targets so far.
+        """
+        target = ti.max(self.wish[block], around[0])
+        self.target[block] = target
+        self.ceiling[block] = ti.max(target, ti.max(self.wish_ceiling[block], around[1]))
+        self.limit[block] = ti.max(target, self.own[block])
+
+    @ti.func
+    def forget(self, block):
+        """A block that holds nobody asks for nothing."""
+        for field in ti.static((self.wish, self.wish_ceiling, self.felt, self.target, self.ceiling, self.limit)):
+            field[block] = 0.0

@@ -83,8 +83,9 @@ class Schedule:
         self.debug = False
 
     @ti.func
-    def due_in(self, block):
-        """First entry of `due` that lies in `block`, and one past the last."""
+    def due_in(self, m):
+        """First entry of `due` that lies in the occupied block number `m`, and one past the last."""
+        block = self.grid.occupied[m]
         return self.due_start[block], self.due_start[block] + self.block_due[block]
 
     def begin(self, timeline: Timeline, target: int) -> bool:

@@ -27,11 +27,7 @@ class Cells(Schedule):
         self.beside = BlockLimiter(grid.geometry)
         blocks = grid.geometry.blocks
         self.blocks = blocks
-        self.occupied = ti.field(ti.i32, blocks)
-        self.occupied_flag = ti.field(ti.i32, blocks)
-        self.occupied_start = ti.field(ti.i32, blocks + 1)
-        self.occupied_scan = ExclusiveScan(self.occupied_flag, self.occupied_start)
-        self.occupied_count = self.occupied_scan.total
+        self.occupied, self.occupied_count = grid.occupied, grid.occupied_count
         self.time = ti.field(ti.i32, blocks)
         """Tick of each cell: the end of its youngest particle's step; `EMPTY` where there is none."""
         self.step = ti.field(ti.i32, blocks)
@@ -52,15 +48,12 @@ class Cells(Schedule):
     def find_cells(self) -> None:
         """Find the occupied cells of a grid that has been sorted anew, their times and steps."""
         self.forget_cells()
-        self.occupied_scan.run()
-        self.list_occupied()
         self.read_cells()
         self.find_youngest()
 
     @ti.kernel
     def forget_cells(self):
         for block in range(self.blocks):
-            self.occupied_flag[block] = ti.cast(self.grid.first(block) < self.grid.first(block + 1), ti.i32)
             self.time[block] = self.EMPTY
             self.step[block] = self.EMPTY
             self.proposal[block] = self.EMPTY
@@ -68,12 +61,6 @@ class Cells(Schedule):
             self.claim[block] = self.EMPTY
             self.block_due[block] = 0
             self.read_at[block] = -1
-
-    @ti.kernel
-    def list_occupied(self):
-        for block in range(self.blocks):
-            if self.occupied_flag[block] == 1:
-                self.occupied[self.occupied_start[block]] = block
 
     @ti.kernel
     def read_cells(self):

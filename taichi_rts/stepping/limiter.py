@@ -43,6 +43,26 @@ class BlockLimiter:
 
 
 @ti.data_oriented
+class Sweep:
+    """One pass of `BlockLimiter.limit` over the occupied blocks, for `Surroundings.visit`."""
+
+    def __init__(self, limiter: BlockLimiter, source: ti.Field, target: ti.Field, factor: int, jump: int) -> None:
+        self.limiter = limiter
+        self.source, self.target = source, target
+        self.factor, self.jump = factor, jump
+
+    @ti.func
+    def read(self, block):
+        """The step [base steps] that neighbours see."""
+        return self.source[block]
+
+    @ti.func
+    def finish(self, block, shortest):
+        """Limit the step of `block` beside others, the shortest of which is given."""
+        self.target[block] = self.limiter.limited(self.source[block], shortest, self.factor, self.jump)
+
+
+@ti.data_oriented
 class NeighbourLimiter:
     """The neighbour limiter of `Regional` and `Asynchronous` (Saitoh & Makino 2009; Durier & Dalla Vecchia 2012).
 

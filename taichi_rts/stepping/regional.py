@@ -17,9 +17,10 @@ from taichi_rts.scan import ExclusiveScan
 from taichi_rts.scene import Positive, Scene
 from taichi_rts.stepping import criteria
 from taichi_rts.stepping.base import Courant, Schedule
-from taichi_rts.stepping.limiter import BlockLimiter, NeighbourLimiter
+from taichi_rts.stepping.limiter import BlockLimiter, NeighbourLimiter, Sweep
 from taichi_rts.stepping.limits import BlockMaxima
 from taichi_rts.stepping.timeline import Timeline
+from taichi_rts.surroundings import Surroundings
 from taichi_rts.validation import FROZEN, validated
 
 LARGEST_COURANT = 0.4
@@ -204,11 +205,19 @@ class RegionalSchedule(Schedule):
         self.limiter = NeighbourLimiter(doubling=False)
         self.until_next = ti.field(ti.i32, ())
         self.now = 0
-        self.ratio_sweeps = max(0, math.ceil(math.log2(self.levels)) - 1) if self.limits else 0
+        ratio_sweeps = max(0, math.ceil(math.log2(self.levels)) - 1) if self.limits else 0
         if self.by_sound:  # whose sound speeds are graded already; forces are not, but reach no further
-            self.ratio_sweeps = min(1, self.ratio_sweeps)
-        self.grading_sweeps = max(0, self.levels - 2) if stepper.grading else 0
+            ratio_sweeps = min(1, ratio_sweeps)
+        grading_sweeps = max(0, self.levels - 2) if stepper.grading else 0
+        reach = NeighbourLimiter.RATIO if self.by_sound else 1  # the sound speed has spread by a block already
+        raw, final = self.raw_level, self.block_level
+        self.sweeps = [Sweep(self.beside, raw, final, reach, 0)]
+        for factor, jump in ratio_sweeps * [(NeighbourLimiter.RATIO, 0)] + grading_sweeps * [(1, 1)]:
+            self.sweeps += [Sweep(self.beside, final, raw, factor, jump), Sweep(self.beside, raw, final, factor, jump)]
+        self.around = Surroundings(grid)
+        self.raw_level.fill(BlockLimiter.EMPTY)
         self.block_level.fill(BlockLimiter.EMPTY)
+        self.read_at.fill(-1)
         if self.aligned:
             grid.track_arrivals()
             self.last_level = ti.field(ti.i32, blocks)
@@ -219,8 +228,9 @@ class RegionalSchedule(Schedule):
             self.flag = ti.field(ti.i32, particles.capacity)
         self.block_due = ti.field(ti.i32, blocks)
         self.due_start = ti.field(ti.i32, blocks + 1)
-        self.scan = ExclusiveScan(self.block_due, self.due_start)
-        self.due_count = self.scan.total
+        if not grid.serial:
+            self.scan = ExclusiveScan(self.block_due, self.due_start)
+            self.due_count = self.scan.total
         self.occupancy = ti.field(ti.i32, self.levels + 1)
         self.updates = ti.field(ti.i32, self.levels + 1)
 
@@ -253,35 +263,54 @@ class RegionalSchedule(Schedule):
 
     def select(self, now: int, tick: float) -> None:
         """Algorithm 1, lines 5-16, and the list of due particles."""
-        self.determine_regions(now, tick, self.reach)
-        self.apply_minimum_region()
-        if self.aligned:
-            self.update_aligned_validity(now, now - self.now)
-        else:
-            self.update_validity(now, now - self.now)
+        self.decide(now, now - self.now, tick, self.reach)
         self.now = now
-        self.scan.run()
-        self.list_due()
 
     @ti.kernel
-    def determine_regions(self, now: ti.i32, tick: float, reach: float):
+    def decide(self, now: ti.i32, passed: ti.i32, tick: float, reach: float):
+        """All of it; `passed` ticks have gone by since the last call. One kernel, for launches cost more than its loops."""
+        self.forget_vacated()
+        self.determine_regions(now, tick, reach)
+        self.apply_minimum_region()
+        if ti.static(self.aligned):
+            self.update_aligned_validity(now, passed)
+        else:
+            self.update_validity(now, passed)
+        self.find_due_starts()
+        self.list_due()
+
+    @ti.func
+    def forget_vacated(self):
+        """Blocks that hold nobody any more have no region, nobody due, and are not read."""
+        for m in range(self.grid.vacated_count[None]):
+            block = self.grid.vacated[m]
+            if ti.static(self.aligned):
+                if self.held[block] > 0:
+                    self.occupancy[self.last_level[block]] += self.held[block]
+                    self.held[block] = 0
+                self.last_level[block] = BlockLimiter.EMPTY
+            self.raw_level[block] = self.block_level[block] = BlockLimiter.EMPTY
+            self.block_due[block] = 0
+            self.read_at[block] = -1
+
+    @ti.func
+    def determine_regions(self, now, tick, reach):
         """Lines 6-9: maxima of |v| and F/m over each block, and the largest n that Eq. 2 and 3 allow."""
-        for block in range(self.blocks):
-            first, end = self.grid.first(block), self.grid.first(block + 1)
+        for m in range(self.grid.occupied_count[None]):
+            block = self.grid.occupied[m]
             level = BlockLimiter.EMPTY
-            if first < end:
-                if ti.static(self.by_sound):  # whose rule has reduced the block already
-                    level = self.region_by_sound(block, tick, reach)
-                else:
-                    speed2, acceleration2, viscosity, density = self.maxima.of(block, now, tick)
-                    level = self.region(tick, reach, speed2, acceleration2, viscosity, density)
-                if ti.static(self.limits):
-                    before = self.block_level[block]  # of the last step; who was empty has nothing to grow from
-                    if before != BlockLimiter.EMPTY:
-                        if ti.static(self.aligned):
-                            level = self.grown(level, before, now)
-                        else:
-                            level = self.limiter.settled(level, before, now)
+            if ti.static(self.by_sound):  # whose rule has reduced the block already
+                level = self.region_by_sound(block, tick, reach)
+            else:
+                speed2, acceleration2, viscosity, density = self.maxima.of(block, now, tick)
+                level = self.region(tick, reach, speed2, acceleration2, viscosity, density)
+            if ti.static(self.limits):
+                before = self.block_level[block]  # of the last step; who was empty has nothing to grow from
+                if before != BlockLimiter.EMPTY:
+                    if ti.static(self.aligned):
+                        level = self.grown(level, before, now)
+                    else:
+                        level = self.limiter.settled(level, before, now)
             self.raw_level[block] = level
 
     @ti.func
@@ -328,21 +357,20 @@ class RegionalSchedule(Schedule):
                             level = n
         return level
 
-    def apply_minimum_region(self) -> None:
+    @ti.func
+    def apply_minimum_region(self):
         """R_min of Section 3, then the sweeps of the limiter and of grading, which spread by a block each."""
-        reach = NeighbourLimiter.RATIO if self.by_sound else 1  # the sound speed has spread by a block already
-        self.beside.limit(self.raw_level, self.block_level, reach, 0)
-        for factor, jump in self.ratio_sweeps * [(NeighbourLimiter.RATIO, 0)] + self.grading_sweeps * [(1, 1)]:
-            self.beside.limit(self.block_level, self.raw_level, factor, jump)
-            self.beside.limit(self.raw_level, self.block_level, factor, jump)
+        for sweep in ti.static(self.sweeps):
+            self.around.visit(sweep, True, BlockLimiter.EMPTY)
 
-    @ti.kernel
-    def update_validity(self, now: ti.i32, passed: ti.i32):
+    @ti.func
+    def update_validity(self, now, passed):
         """Lines 10-16: find who is due, because its validity has run out or its block has another step.
 
-        All take the step of their block. `passed` ticks have gone by since the last call.
+        All take the step of their block.
         """
-        for block in range(self.blocks):
+        for m in range(self.grid.occupied_count[None]):
+            block = self.grid.occupied[m]
             first, end = self.grid.first(block), self.grid.first(block + 1)
             level = self.block_level[block]
             count = 0
@@ -355,65 +383,81 @@ class RegionalSchedule(Schedule):
                 self.flag[k] = flag
                 count += flag
             self.block_due[block] = count
-            if first < end:
-                self.occupancy[level] += (end - first) * passed
-                self.updates[level] += count
+            self.occupancy[level] += (end - first) * passed
+            self.updates[level] += count
 
-    @ti.kernel
-    def update_aligned_validity(self, now: ti.i32, passed: ti.i32):
+    @ti.func
+    def update_aligned_validity(self, now, passed):
         """The same where steps end at multiples of themselves: a block is due as a whole, or nobody in it.
 
         It is due at a multiple of its step, when that has become shorter, or when somebody comes into it with a longer one.
         Who comes with a shorter one steps with the block. Particles of other blocks need not be looked at.
         """
         self.until_next[None] = self.levels
-        for block in range(self.blocks):
+        for m in range(self.grid.occupied_count[None]):
+            block = self.grid.occupied[m]
             first, end = self.grid.first(block), self.grid.first(block + 1)
             level, before = self.block_level[block], self.last_level[block]
             count = 0
             if level != before and self.held[block] > 0:
                 self.occupancy[before] += self.held[block]
                 self.held[block] = 0
-            if first < end:
-                due = now % level == 0 or level < before
-                if self.grid.arrived[block] > 0:
-                    self.grid.arrived[block] = 0
-                    for k in range(first, end):
-                        due = due or self.particles.level[self.grid.order[k]] > level
-                self.held[block] += (end - first) * passed
-                if due:
-                    count = end - first
-                    for k in range(first, end):
-                        self.particles.level[self.grid.order[k]] = level
-                    self.updates[level] += count
-                ti.atomic_min(self.until_next[None], level - now % level)
+            due = now % level == 0 or level < before
+            if self.grid.arrived[block] > 0:
+                self.grid.arrived[block] = 0
+                for k in range(first, end):
+                    due = due or self.particles.level[self.grid.order[k]] > level
+            self.held[block] += (end - first) * passed
+            if due:
+                count = end - first
+                for k in range(first, end):
+                    self.particles.level[self.grid.order[k]] = level
+                self.updates[level] += count
+            ti.atomic_min(self.until_next[None], level - now % level)
             self.block_due[block] = count
             self.last_level[block] = level
 
-    @ti.kernel
+    @ti.func
+    def find_due_starts(self):
+        """Find for every block where its due particles will be in the list, and how many there are in all."""
+        if ti.static(self.grid.serial):
+            ti.loop_config(serialize=True)
+            for _ in range(1):
+                count = 0
+                for m in range(self.grid.occupied_count[None]):
+                    self.due_start[self.grid.occupied[m]] = count
+                    count += self.block_due[self.grid.occupied[m]]
+                self.due_count[None] = count
+        else:
+            self.scan.scan()
+
+    @ti.func
     def list_due(self):
         """List the places of due particles in the grid's order, so that memory access stays contiguous.
 
         And have the blocks read now that hold a due particle or lie beside one that does; the others are left alone.
         """
-        for block in range(self.blocks):
-            if self.block_due[block] > 0:
-                n = self.due_start[block]
-                for k in range(self.grid.first(block), self.grid.first(block + 1)):
-                    if ti.static(self.aligned):
+        self.around.visit(self, False, 0)
+
+    @ti.func
+    def read(self, block):
+        """How many are due in `block`."""
+        return self.block_due[block]
+
+    @ti.func
+    def finish(self, block, due_beside):
+        """List who is due in `block`, and have it read if somebody is there or, `due_beside`, beside it."""
+        if self.block_due[block] > 0:
+            n = self.due_start[block]
+            for k in range(self.grid.first(block), self.grid.first(block + 1)):
+                if ti.static(self.aligned):
+                    self.due[n] = k
+                    n += 1
+                else:
+                    if self.flag[k] == 1:
                         self.due[n] = k
                         n += 1
-                    else:
-                        if self.flag[k] == 1:
-                            self.due[n] = k
-                            n += 1
-        for block in range(self.blocks):
-            due = 0
-            if self.block_level[block] != BlockLimiter.EMPTY:
-                due = self.block_due[block]
-                for k in ti.static(range(len(self.grid.geometry.offsets))):
-                    due = ti.max(due, self.block_due[self.grid.geometry.beside(block, k)])
-            self.read_at[block] = 0 if due > 0 else -1
+        self.read_at[block] = 0 if self.block_due[block] > 0 or due_beside > 0 else -1
 
     @ti.kernel
     def count_held(self):

@@ -84,8 +84,9 @@ class UniformSchedule(Schedule):
             self.due[k] = k
 
     @ti.func
-    def due_in(self, block):
+    def due_in(self, m):
         """All of the block."""
+        block = self.grid.occupied[m]
         return self.grid.first(block), self.grid.first(block + 1)
 
 

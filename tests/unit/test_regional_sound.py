@@ -171,7 +171,7 @@ def strip(sim):
     p.rho.fill(REST)
     p.reference.fill(REST)
     p.sound.fill(FLOOR)
-    for field in (sim.sound.target, sim.sound.wish, sim.sound.fresh, sim.sound.limit):
+    for field in (sim.sound.target, sim.sound.wish, sim.sound.limit):
         field.fill(0.0)
     blocks = sim.grid.cell_of.to_numpy() // CELLS_PER_BLOCK
     return sim, blocks, np.floor(p.x.to_numpy()[:, 0] / R).astype(int)
