@@ -56,6 +56,8 @@ class Setting:
 
 
 REGIONAL_SOUND = {"sound_speed": "regional"}
+INTEGERS: dict[str, Any] = {"steps": "integers", "beta_decay": 0.2}
+"""The paper's levels, within Eq. 1 by a smaller courant."""
 
 
 SETTINGS: tuple[Setting, ...] = (
@@ -63,7 +65,8 @@ SETTINGS: tuple[Setting, ...] = (
     Setting("euler", lambda c: rts.Uniform(courant=c, integrator="symplectic_euler"), rts.Uniform().courant),
     Setting("adaptive", lambda c: rts.Uniform(courant=c, adaptive=True), rts.Uniform().courant),
     Setting("regional", lambda c: rts.Regional(courant=c), rts.Regional().resolved("courant")),
-    Setting("regional_3", lambda c: rts.Regional(courant=c, levels=3), rts.Regional(levels=3).resolved("courant")),
+    Setting("regional_2", lambda c: rts.Regional(courant=c, levels=2, **INTEGERS), 0.2),
+    Setting("regional_3", lambda c: rts.Regional(courant=c, levels=3, **INTEGERS), 0.4 / 3),
     Setting(
         "regional_paper",
         lambda c: rts.Regional(courant=c, preset="paper"),
@@ -77,7 +80,9 @@ SETTINGS: tuple[Setting, ...] = (
     ),
     Setting("adaptive_c", lambda c: rts.Uniform(courant=c, adaptive=True), rts.Uniform().courant, REGIONAL_SOUND),
     Setting("regional_c", lambda c: rts.Regional(courant=c), LARGEST_COURANT, REGIONAL_SOUND),
-    Setting("asynchronous_c", lambda c: rts.Asynchronous(courant=c), LARGEST_COURANT, REGIONAL_SOUND),
+    Setting(
+        "asynchronous_c", lambda c: rts.Asynchronous(courant=c), rts.Asynchronous().longest_courant, REGIONAL_SOUND
+    ),
 )
 """All steppers, in the order of the map's columns; those that end in "_c" run with the regional sound speed."""
 

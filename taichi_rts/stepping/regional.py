@@ -4,33 +4,28 @@ import math
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
-import numpy as np
-import taichi as ti
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from taichi_rts.errors import StepperError
 from taichi_rts.grid import BlockGrid
 from taichi_rts.integrators.serna import Serna
-from taichi_rts.particles import Particles, Rows
-from taichi_rts.scan import ExclusiveScan
+from taichi_rts.particles import Particles
 from taichi_rts.scene import Positive, Scene
 from taichi_rts.stepping import criteria
 from taichi_rts.stepping.base import Courant, Schedule
-from taichi_rts.stepping.limiter import BlockLimiter, NeighbourLimiter, Sweep
-from taichi_rts.stepping.limits import BlockMaxima
+from taichi_rts.stepping.regions import RegionalSchedule, lengths
 from taichi_rts.stepping.timeline import Timeline
-from taichi_rts.surroundings import Surroundings
+from taichi_rts.stepping.uniform import Uniform
 from taichi_rts.validation import FROZEN, validated
 
-LARGEST_COURANT = 0.4
-"""Courant number of the longest step at the defaults, the same as that of `Uniform`: calm water then moves exactly as with
-uniform steps. Still pools stay calm up to 0.6 on average, though single ones differ by 40 %; at 0.7 they move twice as much,
-at 0.8 they simmer (`docs/defaults.md`)."""
+LARGEST_COURANT = 0.6
+"""Courant number of the longest step at the defaults. Still pools are as calm as at 0.4, and errors in dam breaks no larger; at
+0.7 pools move twice as much, at 0.8 they simmer (`docs/defaults.md`)."""
 
 MOST_LEVELS = 32
 PRESETS: dict[str | None, dict[str, Any]] = {
-    None: {"levels": 2, "strict_cfl": False, "lambda_f": 0.1, "steps": "integers"},
+    None: {"levels": 3, "strict_cfl": False, "lambda_f": 0.1},
     "paper": {
         "courant": 0.4,
         "levels": 3,
@@ -38,6 +33,7 @@ PRESETS: dict[str | None, dict[str, Any]] = {
         "lambda_f": 0.1,
         "limiter": False,
         "steps": "integers",
+        "beta_decay": 0.2,
     },
 }
 """The paper asks for lambda_f <= 0.25. At 0.25 a double dam break gains 2.2 % of energy, at 0.1 0.1 % (docs/defaults.md)."""
@@ -47,22 +43,14 @@ REGIONAL_SOUND = {
     "lambda_f": 0.1,
     "limiter": True,
     "steps": "half_octaves",
+    "beta_decay": 1.0,
 }
 """What fields that are None become in a scene with a regional sound speed; `levels` follows from the range of sound speeds."""
 FROM_LEVELS: dict[str, Any] = {
-    "courant": lambda levels: LARGEST_COURANT / levels,
+    "courant": lambda levels: LARGEST_COURANT / levels if levels > 1 else Uniform().courant,
     "limiter": lambda levels: levels > 2,  # with two levels it changes nothing but the work (docs/asynchronous.md)
+    "steps": lambda levels: "half_octaves" if levels in lengths("half_octaves", levels) else "integers",
 }
-
-
-def lengths(steps: str, most: int) -> list[int]:
-    """Levels up to `most` that blocks may have."""
-    keep = {
-        "integers": lambda n: True,
-        "powers_of_two": lambda n: n & (n - 1) == 0,
-        "half_octaves": lambda n: n & (n - 1) == 0 or (n % 3 == 0 and (n // 3) & (n // 3 - 1) == 0),
-    }[steps]
-    return [n for n in range(1, most + 1) if keep(n)]
 
 
 @validated(StepperError)
@@ -71,14 +59,15 @@ class Regional:
     """Blocks get steps of n base steps; only due particles recompute density and forces.
 
     Attributes:
-        courant: lambda_v of Eq. 1; with `strict_cfl` off it sets the base step, with it on the longest step. None: 0.4 / levels,
-            so that the longest step is 0.4 r/c_s.
-        levels: n_max, the largest n; None: 2.
+        courant: lambda_v of Eq. 1; with `strict_cfl` off it sets the base step, with it on the longest step. None: 0.6 / levels,
+            so that the longest step is 0.6 r/c_s; with one level as `Uniform`.
+        levels: n_max, the largest n; None: 3.
         corrector: apply Serna's correction (Eq. 6-7); without it the method blows up (the paper's Figure 2).
         strict_cfl: divide the base step by n_max, so that the longest step too respects Eq. 1.
         preset: "paper" for the paper's setting (courant 0.4, 3 levels, Eq. 1 not enforced for n >= 2); explicit arguments
             win.
-        alpha, beta, beta_decay: Eq. 3, with beta_n = beta * beta_decay^(n-2).
+        alpha, beta, beta_decay: Eq. 3, with beta_n = beta * beta_decay^(n-2). None: no decay (1) where the longest step is at
+            most 0.6 r/c_s, so that Eq. 1 holds; else the paper's 0.2.
         lambda_f: Eq. 2, at most 0.25 in the paper; None: 0.1.
         local_sound: shorten steps to what Eq. 1 allows the sound of water that is compressed by more than 3 % (Tait stiffens
             it: 2.7 c_s at 1.4 rho_0); the base step stays. It moved no limit in the stability map, and disturbs the first
@@ -89,8 +78,9 @@ class Regional:
             levels up, off in the paper's preset.
         inactive_density: what due particles read of others: "stale" (of the last evaluation) or "extrapolated".
         steps: levels that blocks may have: "integers", "half_octaves" (1, 2, 3, 4, 6, 8, 12, ...) or "powers_of_two"; None: half
-            octaves with a regional sound speed. Except for integers with one sound speed, the paper's, steps end at multiples of
-            themselves, so that blocks of one level are due together.
+            octaves, but integers in the paper's preset and where n_max is no half octave. Except for integers with one sound
+            speed, steps end at multiples of themselves, so that blocks of one level are due together, and base steps in which
+            nobody is due are passed over.
 
     In a scene with a regional sound speed the base step is lambda_v r over the largest sound speed, level n means that Eq. 1
     holds for n base steps with the block's own, and Eq. 3 is left to the sound speed, which follows the velocity.
@@ -103,7 +93,7 @@ class Regional:
     preset: Literal["paper"] | None = None
     alpha: Positive = 0.4
     beta: Positive = 0.4
-    beta_decay: Annotated[float, Field(gt=0, le=1)] = 0.2
+    beta_decay: Annotated[float, Field(gt=0, le=1)] | None = None
     lambda_f: Positive | None = None
     local_sound: bool = False
     grading: bool = False
@@ -120,12 +110,14 @@ class Regional:
         value = getattr(self, key)
         if value is None:
             value = PRESETS[self.preset].get(key)
+        if value is None and key == "beta_decay":
+            return 1.0 if self.longest_courant <= LARGEST_COURANT * (1.0 + 1e-9) else 0.2
         return FROM_LEVELS[key](self.resolved("levels")) if value is None else value
 
     def in_scene(self, scene: Scene) -> "Regional":
         """Return a copy in which nothing is None any more; raises `StepperError` if the preset is not for such a scene."""
         if scene.regional_sound is None:
-            keys = ("levels", "courant", "strict_cfl", "lambda_f", "limiter", "steps")
+            keys = ("levels", "courant", "strict_cfl", "lambda_f", "limiter", "steps", "beta_decay")
             settings: dict[str, Any] = {key: self.resolved(key) for key in keys}
             return replace(self, **settings)
         if self.preset is not None:
@@ -169,314 +161,3 @@ class Regional:
     def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
         """Build the schedule of Algorithm 1."""
         return RegionalSchedule(self.in_scene(scene), scene, particles, grid)
-
-
-@ti.data_oriented
-class RegionalSchedule(Schedule):
-    """Region determination and compute flags: lines 5-16 of Algorithm 1.
-
-    `block_level` is the region of each block (`BlockLimiter.EMPTY` where there is no particle).
-    """
-
-    def __init__(self, stepper: Regional, scene: Scene, particles: Particles, grid: BlockGrid) -> None:
-        super().__init__(particles, grid)
-        self.scene = scene
-        self.levels = stepper.resolved("levels")
-        self.lambda_f = stepper.resolved("lambda_f")
-        self.support = scene.support
-        self.sound_speed = scene.wave_speed
-        self.local_sound = stepper.local_sound
-        self.retime(stepper)
-        self.fractions = [
-            criteria.velocity_fraction(n, stepper.alpha, stepper.beta, stepper.beta_decay)
-            for n in range(2, self.levels + 1)
-        ]
-        blocks = grid.geometry.blocks
-        self.blocks = blocks
-        self.raw_level = ti.field(ti.i32, blocks)
-        self.block_level = ti.field(ti.i32, blocks)
-        self.maxima = BlockMaxima(scene, particles, grid)
-        self.beside = BlockLimiter(grid.geometry)
-        self.limits = stepper.resolved("limiter")
-        self.by_sound = scene.regional_sound is not None
-        self.lengths = lengths(stepper.resolved("steps"), self.levels)
-        self.aligned = self.by_sound or stepper.resolved("steps") != "integers"
-        self.levels_double = self.aligned
-        self.limiter = NeighbourLimiter(doubling=False)
-        self.until_next = ti.field(ti.i32, ())
-        self.now = 0
-        ratio_sweeps = max(0, math.ceil(math.log2(self.levels)) - 1) if self.limits else 0
-        if self.by_sound:  # whose sound speeds are graded already; forces are not, but reach no further
-            ratio_sweeps = min(1, ratio_sweeps)
-        grading_sweeps = max(0, self.levels - 2) if stepper.grading else 0
-        reach = NeighbourLimiter.RATIO if self.by_sound else 1  # the sound speed has spread by a block already
-        raw, final = self.raw_level, self.block_level
-        self.sweeps = [Sweep(self.beside, raw, final, reach, 0)]
-        for factor, jump in ratio_sweeps * [(NeighbourLimiter.RATIO, 0)] + grading_sweeps * [(1, 1)]:
-            self.sweeps += [Sweep(self.beside, final, raw, factor, jump), Sweep(self.beside, raw, final, factor, jump)]
-        self.around = Surroundings(grid)
-        self.raw_level.fill(BlockLimiter.EMPTY)
-        self.block_level.fill(BlockLimiter.EMPTY)
-        self.read_at.fill(-1)
-        if self.aligned:
-            grid.track_arrivals()
-            self.last_level = ti.field(ti.i32, blocks)
-            self.last_level.fill(BlockLimiter.EMPTY)
-            self.held = ti.field(ti.i32, blocks)
-            """Particles times base steps that are not in `occupancy` yet: one by one is quicker than all in one place."""
-        else:
-            self.flag = ti.field(ti.i32, particles.capacity)
-        self.block_due = ti.field(ti.i32, blocks)
-        self.due_start = ti.field(ti.i32, blocks + 1)
-        if not grid.serial:
-            self.scan = ExclusiveScan(self.block_due, self.due_start)
-            self.due_count = self.scan.total
-        self.occupancy = ti.field(ti.i32, self.levels + 1)
-        self.updates = ti.field(ti.i32, self.levels + 1)
-
-    def retime(self, stepper: Regional, timeline: Timeline | None = None) -> bool:
-        """Take another courant."""
-        self.reach = stepper.longest_courant * self.support
-        if self.scene.regional_sound is not None:
-            self.reach = stepper.in_scene(self.scene).resolved("courant") * self.support
-        return True
-
-    def restart(self, now: int) -> None:
-        """Forget steps and levels."""
-        self.now = self.steps = now
-        self.particles.level.fill(0)
-        self.block_level.fill(BlockLimiter.EMPTY)
-        if self.aligned:
-            self.last_level.fill(BlockLimiter.EMPTY)
-            self.held.fill(0)
-        self.take_counts()
-
-    def begin(self, timeline: Timeline, target: int) -> bool:
-        """Set the clock to the next step at which somebody may be due."""
-        begun = super().begin(timeline, target)
-        self.steps = timeline.now if begun else self.steps
-        return begun
-
-    def next_ticks(self) -> int:
-        """Ticks to the end of the first step that ends: before it nobody is due."""
-        return max(1, int(self.until_next[None])) if self.aligned else 1
-
-    def select(self, now: int, tick: float) -> None:
-        """Algorithm 1, lines 5-16, and the list of due particles."""
-        self.decide(now, now - self.now, tick, self.reach)
-        self.now = now
-
-    @ti.kernel
-    def decide(self, now: ti.i32, passed: ti.i32, tick: float, reach: float):
-        """All of it; `passed` ticks have gone by since the last call. One kernel, for launches cost more than its loops."""
-        self.forget_vacated()
-        self.determine_regions(now, tick, reach)
-        self.apply_minimum_region()
-        if ti.static(self.aligned):
-            self.update_aligned_validity(now, passed)
-        else:
-            self.update_validity(now, passed)
-        self.find_due_starts()
-        self.list_due()
-
-    @ti.func
-    def forget_vacated(self):
-        """Blocks that hold nobody any more have no region, nobody due, and are not read."""
-        for m in range(self.grid.vacated_count[None]):
-            block = self.grid.vacated[m]
-            if ti.static(self.aligned):
-                if self.held[block] > 0:
-                    self.occupancy[self.last_level[block]] += self.held[block]
-                    self.held[block] = 0
-                self.last_level[block] = BlockLimiter.EMPTY
-            self.raw_level[block] = self.block_level[block] = BlockLimiter.EMPTY
-            self.block_due[block] = 0
-            self.read_at[block] = -1
-
-    @ti.func
-    def determine_regions(self, now, tick, reach):
-        """Lines 6-9: maxima of |v| and F/m over each block, and the largest n that Eq. 2 and 3 allow."""
-        for m in range(self.grid.occupied_count[None]):
-            block = self.grid.occupied[m]
-            level = BlockLimiter.EMPTY
-            if ti.static(self.by_sound):  # whose rule has reduced the block already
-                level = self.region_by_sound(block, tick, reach)
-            else:
-                speed2, acceleration2, viscosity, density = self.maxima.of(block, now, tick)
-                level = self.region(tick, reach, speed2, acceleration2, viscosity, density)
-            if ti.static(self.limits):
-                before = self.block_level[block]  # of the last step; who was empty has nothing to grow from
-                if before != BlockLimiter.EMPTY:
-                    if ti.static(self.aligned):
-                        level = self.grown(level, before, now)
-                    else:
-                        level = self.limiter.settled(level, before, now)
-            self.raw_level[block] = level
-
-    @ti.func
-    def region(self, base_step, reach, speed2, acceleration2, viscosity, density):
-        """Section 2: the largest n whose step satisfies Eq. 2, Eq. 3, the viscous limit and Eq. 1 with the local sound speed.
-
-        (With c_s Eq. 1 is the same for all blocks: it sets the base step.)
-        """
-        level = 1
-        for n in ti.static(range(2, self.levels + 1)):
-            step = base_step * n
-            if criteria.allows_force(step, self.lambda_f, self.support, acceleration2):
-                if criteria.allows_velocity(step, ti.static(self.fractions[n - 2]), self.support, speed2):
-                    if criteria.allows_viscosity(step, self.support, viscosity):
-                        if ti.static(not self.local_sound) or criteria.allows_sound(
-                            step, reach, self.sound_speed, density
-                        ):
-                            level = n
-        return level
-
-    @ti.func
-    def grown(self, wanted, before, now):
-        """Level of a block that had another: less at once, more only by one of `lengths`, at a multiple of it."""
-        level = wanted
-        if wanted > before:
-            level = before
-            for k in ti.static(range(len(self.lengths) - 1)):
-                if before == self.lengths[k] and now % self.lengths[k + 1] == 0:
-                    level = self.lengths[k + 1]
-        return level
-
-    @ti.func
-    def region_by_sound(self, block, base_step, reach):
-        """The largest level for which Eq. 1 holds with the block's own sound speed [m/s], Eq. 2 and the viscous limit."""
-        acceleration2, viscosity = self.sound.acceleration2[block], self.sound.viscosity[block]
-        sound = self.sound.limit[block]
-        level = 1
-        for n in ti.static(range(2, self.levels + 1)):
-            if ti.static(n in self.lengths):
-                step = base_step * n
-                if criteria.allows_force(step, self.lambda_f, self.support, acceleration2):
-                    if criteria.allows_viscosity(step, self.support, viscosity):
-                        if step * sound <= reach * (1.0 + 1e-6):
-                            level = n
-        return level
-
-    @ti.func
-    def apply_minimum_region(self):
-        """R_min of Section 3, then the sweeps of the limiter and of grading, which spread by a block each."""
-        for sweep in ti.static(self.sweeps):
-            self.around.visit(sweep, True, BlockLimiter.EMPTY)
-
-    @ti.func
-    def update_validity(self, now, passed):
-        """Lines 10-16: find who is due, because its validity has run out or its block has another step.
-
-        All take the step of their block.
-        """
-        for m in range(self.grid.occupied_count[None]):
-            block = self.grid.occupied[m]
-            first, end = self.grid.first(block), self.grid.first(block + 1)
-            level = self.block_level[block]
-            count = 0
-            for k in range(first, end):
-                i = self.grid.order[k]
-                own = self.particles.level[i]
-                flag = ti.cast(own - (now - self.particles.updated[i]) <= 0 or own != level, ti.i32)
-                if own != level:
-                    self.particles.level[i] = level
-                self.flag[k] = flag
-                count += flag
-            self.block_due[block] = count
-            self.occupancy[level] += (end - first) * passed
-            self.updates[level] += count
-
-    @ti.func
-    def update_aligned_validity(self, now, passed):
-        """The same where steps end at multiples of themselves: a block is due as a whole, or nobody in it.
-
-        It is due at a multiple of its step, when that has become shorter, or when somebody comes into it with a longer one.
-        Who comes with a shorter one steps with the block. Particles of other blocks need not be looked at.
-        """
-        self.until_next[None] = self.levels
-        for m in range(self.grid.occupied_count[None]):
-            block = self.grid.occupied[m]
-            first, end = self.grid.first(block), self.grid.first(block + 1)
-            level, before = self.block_level[block], self.last_level[block]
-            count = 0
-            if level != before and self.held[block] > 0:
-                self.occupancy[before] += self.held[block]
-                self.held[block] = 0
-            due = now % level == 0 or level < before
-            if self.grid.arrived[block] > 0:
-                self.grid.arrived[block] = 0
-                for k in range(first, end):
-                    due = due or self.particles.level[self.grid.order[k]] > level
-            self.held[block] += (end - first) * passed
-            if due:
-                count = end - first
-                for k in range(first, end):
-                    self.particles.level[self.grid.order[k]] = level
-                self.updates[level] += count
-            ti.atomic_min(self.until_next[None], level - now % level)
-            self.block_due[block] = count
-            self.last_level[block] = level
-
-    @ti.func
-    def find_due_starts(self):
-        """Find for every block where its due particles will be in the list, and how many there are in all."""
-        if ti.static(self.grid.serial):
-            ti.loop_config(serialize=True)
-            for _ in range(1):
-                count = 0
-                for m in range(self.grid.occupied_count[None]):
-                    self.due_start[self.grid.occupied[m]] = count
-                    count += self.block_due[self.grid.occupied[m]]
-                self.due_count[None] = count
-        else:
-            self.scan.scan()
-
-    @ti.func
-    def list_due(self):
-        """List the places of due particles in the grid's order, so that memory access stays contiguous.
-
-        And have the blocks read now that hold a due particle or lie beside one that does; the others are left alone.
-        """
-        self.around.visit(self, False, 0)
-
-    @ti.func
-    def read(self, block):
-        """How many are due in `block`."""
-        return self.block_due[block]
-
-    @ti.func
-    def finish(self, block, due_beside):
-        """List who is due in `block`, and have it read if somebody is there or, `due_beside`, beside it."""
-        if self.block_due[block] > 0:
-            n = self.due_start[block]
-            for k in range(self.grid.first(block), self.grid.first(block + 1)):
-                if ti.static(self.aligned):
-                    self.due[n] = k
-                    n += 1
-                else:
-                    if self.flag[k] == 1:
-                        self.due[n] = k
-                        n += 1
-        self.read_at[block] = 0 if self.block_due[block] > 0 or due_beside > 0 else -1
-
-    @ti.kernel
-    def count_held(self):
-        for block in range(self.blocks):
-            if self.held[block] > 0:
-                self.occupancy[self.last_level[block]] += self.held[block]
-                self.held[block] = 0
-
-    def take_counts(self) -> tuple[list[int], list[int]]:
-        """Return particles and updates per level since the last call."""
-        if self.aligned:
-            self.count_held()
-        counts = np.zeros((2, self.levels + 1), np.int32)
-        self.read_counts(counts)
-        occupancy, updates = counts[:, 1:].tolist()
-        return occupancy, updates
-
-    @ti.kernel
-    def read_counts(self, counts: Rows):
-        for n in range(self.levels + 1):
-            counts[0, n], counts[1, n] = self.occupancy[n], self.updates[n]
-            self.occupancy[n] = self.updates[n] = 0

@@ -23,7 +23,7 @@ SCENE = rts.Scene(domain=rts.Box((0, 0), (LENGTH, 1)), fluids=(POOL, BLOCK), spa
 COURANT = 0.4
 STEPPERS = {
     "adaptive": rts.Uniform(courant=COURANT, adaptive=True),
-    "regional": rts.Regional(),
+    "regional": rts.Regional(courant=COURANT),
     "asynchronous": rts.Asynchronous(),
 }
 TIMES = np.linspace(0.005, 0.1, 20)

@@ -7,7 +7,7 @@ from taichi_rts import backend
 from taichi_rts.grid import BlockGrid, Geometry
 from taichi_rts.particles import Particles
 from taichi_rts.stepping.limiter import BlockLimiter, NeighbourLimiter
-from taichi_rts.stepping.regional import RegionalSchedule
+from taichi_rts.stepping.regions import RegionalSchedule
 
 EMPTY = BlockLimiter.EMPTY
 

@@ -68,7 +68,7 @@ def test_levels_follow_eq_2_and_3_from_block_maxima(recorded):
         np.maximum.at(force, step["block"], np.linalg.norm(old["a"], axis=1)[step["order"]])
         expected[step["block"]] = 1
         for n in range(2, stepper.resolved("levels") + 1):
-            beta = stepper.beta * stepper.beta_decay ** (n - 2)
+            beta = stepper.beta * stepper.resolved("beta_decay") ** (n - 2)
             with np.errstate(divide="ignore"):
                 eq_2 = n * tick <= lambda_f * np.sqrt(support / force)
             eq_3 = n * tick * speed / support <= stepper.alpha * beta
