@@ -179,6 +179,7 @@ class Simulation:
         self.setup_seconds = clock.perf_counter() - began
 
     def _start(self) -> None:
+        self._update_grid(self.timeline.now, self.timeline.tick)  # so that the first step puts them in this order
         self.step()  # lines 1-2: validity 0, so everybody is due now, where the first forces are evaluated
         self.schedule.take_counts()
         self.schedule.begin(
@@ -214,8 +215,11 @@ class Simulation:
         if self._sorts % REORDER_EVERY == 0:
             self.particles.reorder(self.grid.order)
         self._sorts += 1
-        self.grid.update(self.motion.locate_particles, self.particles.identity, now, tick)
+        self._update_grid(now, tick)
         self.schedule.sorted(now, tick)
+
+    def _update_grid(self, now: int, tick: float) -> None:
+        self.grid.update(self.motion.locate_particles, self.particles.identity, now, tick)
 
     def advance_to(self, time: float) -> None:
         """Run all steps up to physical `time` [s]; readers then predict to exactly that time.
