@@ -31,7 +31,7 @@ COMPILED = 400 << 20
 """Bytes that Python, the compiler and compiled kernels take besides."""
 BLOCK_INTEGERS = {"uniform": 3, "regional": 9, "asynchronous": 10}
 """Fields of 32-bit integers that each stepper has with an entry for each block."""
-FIXED = 1 << 17
+FIXED = 1 << 14
 """Bytes of fields whose size does not depend on the scene, about."""
 WALL_SHARE = 0.45
 """Entries of the windows on a wall at rest over those of the windows on the fluid, about."""

@@ -1,11 +1,12 @@
 """What the regional sound speed saves, and what it costs in accuracy: the figures of docs/regional_sound_speed.md.
 
-python tests/benchmarks/regional_sound.py [speed|extremes|rule|pool ...] [--particles 100k] [--scenes projectile,...]
-speed takes about 25 minutes on 2 idle cores at 100k particles, the others a few minutes at their 6k.
+python tests/benchmarks/regional_sound.py [speed|equal_error|extremes|rule|pool ...] [--particles 100k] [--scenes projectile,...]
+speed takes about 15 minutes on 2 idle cores at 100k particles, equal_error as long at 3k, the others a few minutes at their 6k.
 """
 
 import dataclasses
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ import tyro
 from tables import head, row
 
 import taichi_rts as rts
+from taichi_rts.compare import Settings, compare
+from taichi_rts.compare.speedups import at_equal_error
 from taichi_rts.extremes import DENSE
 
 SCENES = "projectile,water_jet,dam_break_drop,double_dam_break,martin_moyce"
@@ -111,6 +114,40 @@ def speed(names: list[str], particles: str, courants: list[float], steppers: str
                     f"{seen.speed:.1f}",
                     seen.runaways,
                 )
+
+
+ERRORS = ("centre_of_mass", "kinetic_energy")
+
+
+def equal_error(names: list[str], particles: str, courants: list[float], steppers: str) -> None:
+    """Updates against the best uniform run at equal error, which has ten times the largest speed that occurs as sound speed.
+
+    Errors are those of `taichi-rts compare`. What is done is kept in out/equal_error; a second call goes on from there.
+    """
+    print()
+    head("scene, particles", "c of uniform [m/s]", "run", "updates [M]", *(f"{e}: error | saved" for e in ERRORS))
+    for name in names:
+        scene = rts.load_scene(name, particles=particles)
+        speed = max(scene.estimate_max_speed(), run(scene, rts.Uniform()).speed)
+        scene = scene.replace(sound_speed=round(10.0 * speed, 1))
+        settings = Settings(("uniform", "regional-c"), tuple(courants), repeats=1)
+        report = compare(scene, settings, folder=Path("out") / "equal_error" / f"{name}_{particles}")
+        alive = [each for each in report["variants"] if each["survived"]]
+
+        def points(error: str, alive: list[dict[str, Any]] = alive) -> list[tuple[float, float]]:
+            """Cost and error of all uniform runs."""
+            runs = [each for each in alive if each["family"] == "uniform" and each["errors"].get(error)]
+            return [(each["costs"]["particle_updates"], each["errors"][error]) for each in runs]
+
+        for each in sorted(alive, key=lambda each: (each["family"], each["costs"]["particle_updates"])):
+            updates = each["costs"]["particle_updates"]
+            found = []
+            for error in ERRORS:
+                value = each["errors"][error]
+                own = each["family"] == "uniform"
+                found.append(f"{value:.2g} | {'-' if own else at_equal_error(points(error), (updates, value))}")
+            where = f"{name}, {report['scenes'][0]['particles']:,}"
+            row(where, f"{scene.sound_speed:g}", each["label"], f"{updates / 1e6:.2f}", *found)
 
 
 def extremes(names: list[str], particles: str, courants: list[float], steppers: str) -> None:
@@ -229,22 +266,23 @@ def pool(names: list[str], particles: str, courants: list[float], steppers: str)
         )
 
 
-PARTS = {part.__name__: part for part in (speed, extremes, rule, pool)}
+PARTS = {part.__name__: part for part in (speed, equal_error, extremes, rule, pool)}
 
 
 def main(
     parts: tyro.conf.Positional[tuple[str, ...]] = tuple(PARTS),
     particles: str | None = None,
     scenes: str = SCENES,
-    courants: str = "0.6",
+    courants: str | None = None,
     steppers: str = "uniform,uniform-c,regional-c,asynchronous-c",
     arch: str = "cpu",
 ) -> None:
     """Run the parts."""
     rts.init(arch, "f32")
     for part in parts:
-        count = particles or ("100k" if part == "speed" else "6k")
-        PARTS[part](scenes.split(","), count, [float(courant) for courant in courants.split(",")], steppers)
+        count = particles or {"speed": "100k", "equal_error": "3k"}.get(part, "6k")
+        some = courants or ("0.4,0.6,0.8,1.0" if part == "equal_error" else "0.6")
+        PARTS[part](scenes.split(","), count, [float(courant) for courant in some.split(",")], steppers)
 
 
 if __name__ == "__main__":

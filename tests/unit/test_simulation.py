@@ -78,7 +78,7 @@ def test_reordering_in_memory_keeps_the_state_and_its_ids(taichi_cpu_f64):
 
 
 def test_reordering_does_not_depend_on_output_times(taichi_cpu_f64, monkeypatch):
-    sim = rts.Simulation(SMALL)
+    sim = rts.Simulation(SMALL, rts.Uniform())  # which sorts every step
     calls = []
     monkeypatch.setattr(sim.particles, "reorder", calls.append)
     for n in range(8):

@@ -60,11 +60,11 @@ def test_a_comparison_from_the_command_line(tmp_path, capsys, quick_jobs, monkey
     shown = capsys.readouterr().out
     report = json.loads((tmp_path / "out" / "compare.json").read_text())
     runs = {run["label"]: run for run in report["variants"]}
-    assert list(runs)[:2] == ["uniform λ=0.2", "uniform λ=0.4"]
-    assert runs["uniform λ=0.2"]["role"] == "base step"
+    assert list(runs)[:2] == ["uniform λ=0.1333", "uniform λ=0.4"]
+    assert runs["uniform λ=0.1333"]["role"] == "base step"
     assert sum(run["role"] == "largest stable" for run in runs.values()) == 1
     floor = report["scenes"][0]["floor"]["velocities"]
-    assert 0.0 < floor < runs["uniform λ=0.2"]["errors"]["velocities"] < runs["uniform λ=0.4"]["errors"]["velocities"]
+    assert 0.0 < floor < runs["uniform λ=0.1333"]["errors"]["velocities"] < runs["uniform λ=0.4"]["errors"]["velocities"]
     regional = runs["regional λ=0.4"]
     assert regional["costs"]["pair_interactions"] > 5 * regional["costs"]["particle_updates"]
     assert len(regional["costs"]["wall_seconds_all"]) == 2

@@ -97,10 +97,11 @@ def test_the_number_is_the_courant_number_of_the_longest_step():
 def test_uniform_runs_at_every_regional_base_step_are_added_once():
     _, variants = plan(SCENE, Settings(steppers=("uniform", "regional", "paper"), courants=(0.4, 0.8)))
     uniform = [(v.courant, v.role) for v in variants if v.family == "uniform"]
-    assert uniform == [(0.2, "base step"), (0.4, "sweep"), (0.8, "sweep")]
-    assert smallest_step(variants) == pytest.approx(0.2)
+    steps = [(0.1333333333, "base step"), (0.2666666667, "base step"), (0.4, "sweep"), (0.8, "sweep")]
+    assert uniform == steps
+    assert smallest_step(variants) == pytest.approx(0.4 / 3)
     without = families([], steppers=("regional",), courants=(0.4, 0.8))
-    assert without[:2] == ["uniform λ=0.2", "uniform λ=0.4"]
+    assert without[:2] == ["uniform λ=0.1333", "uniform λ=0.2667"]
 
 
 def test_lists_are_checked():
