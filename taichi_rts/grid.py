@@ -176,7 +176,7 @@ class BlockGrid:
     """Sorts the `alive[None]` first of up to `count` particles (all, if `alive` is None) into cells.
 
     `order[k]` is the particle at place k; cell c holds places `start[c] .. start[c+1]`. `occupied` lists the blocks that hold
-    somebody, ascending, `occupied_count[None]` of them; `vacated`, likewise, those that no longer do since the last update.
+    somebody, ascending, `occupied_count[None]` of them.
 
     Within a cell particles stand in order of their id, so the result depends on positions alone: not on threads, not on
     history. Work: two passes over the particles, two over the cells.
@@ -197,8 +197,6 @@ class BlockGrid:
         self.start = ti.field(ti.i32, geometry.cells + 1)
         self.scan = ExclusiveScan(self.cell_count, self.start)
         self.occupied = ti.field(ti.i32, geometry.blocks)
-        self.vacated = ti.field(ti.i32, geometry.blocks)
-        self.vacated_count = ti.field(ti.i32, ())
         self.serial = on_cpu()
         if self.serial:
             self.occupied_count = ti.field(ti.i32, ())
@@ -207,7 +205,7 @@ class BlockGrid:
             self.occupied_start = ti.field(ti.i32, geometry.blocks + 1)
             self.occupied_scan = ExclusiveScan(self.occupied_flag, self.occupied_start)
             self.occupied_count = self.occupied_scan.total
-        self.tracks_arrivals = False
+        self.tracks_arrivals = self.tracks_vacated = False
 
     def track_arrivals(self) -> None:
         """From now on note in `arrived`, (blocks,), which blocks a particle has come into; who reads it sets it back to 0.
@@ -216,6 +214,16 @@ class BlockGrid:
         """
         self.tracks_arrivals = True
         self.arrived = ti.field(ti.i32, self.geometry.blocks)
+
+    def track_vacated(self) -> None:
+        """From now on list in `vacated` the `vacated_count[None]` blocks that nobody is in any more since the last update.
+
+        Has to be called before the first `update`.
+        """
+        if not self.tracks_vacated:
+            self.tracks_vacated = True
+            self.vacated = ti.field(ti.i32, self.geometry.blocks)
+            self.vacated_count = ti.field(ti.i32, ())
 
     def update(self, locate: Callable[..., Any], identity: ti.Field, *time: Any) -> None:
         """Sort anew. `locate(*time)` is a kernel that calls `insert` once for every particle."""
@@ -241,7 +249,8 @@ class BlockGrid:
         self.scan.scan()
         for i in range(self.alive[None]):
             self.order[self.start[self.cell_of[i]] + self.rank[i]] = i
-        self.list_vacated()
+        if ti.static(self.tracks_vacated):
+            self.list_vacated()
         self.list_occupied()
         for m in range(self.occupied_count[None]):
             for part in range(CELLS_PER_BLOCK):

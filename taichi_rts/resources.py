@@ -29,7 +29,7 @@ LINING = 10 * SAMPLING
 """Bytes of the host per boundary particle of an obstacle and dimension: they are chosen from about ten times as many points."""
 COMPILED = 400 << 20
 """Bytes that Python, the compiler and compiled kernels take besides."""
-BLOCK_INTEGERS = {"uniform": 3, "regional": 9, "asynchronous": 10}
+BLOCK_INTEGERS = {"uniform": 2, "regional": 9, "asynchronous": 9}
 """Fields of 32-bit integers that each stepper has with an entry for each block."""
 FIXED = 1 << 14
 """Bytes of fields whose size does not depend on the scene, about."""

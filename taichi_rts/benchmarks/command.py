@@ -13,9 +13,11 @@ from rich.table import Table
 
 from taichi_rts.benchmarks import peers
 from taichi_rts.benchmarks.device import device
+from taichi_rts.benchmarks.plot import draw
 from taichi_rts.benchmarks.rows import ROWS, Row, Settings, profile
+from taichi_rts.compare.plot import require_plots
 from taichi_rts.errors import Error
-from taichi_rts.output.files import write_json
+from taichi_rts.output.files import write_bytes, write_json
 
 PARTS = {**ROWS, "device": device}
 
@@ -34,6 +36,8 @@ class Bench:
     """Where kernels run."""
     json: Path | None = None
     """Also write the figures to this file."""
+    plot: Path | None = None
+    """Also draw cost against size (rows size) into this PNG file; needs the extra `plots`."""
     profile: bool = False
     """Instead print the time of each kernel."""
     peer_script: Path = peers.SCRIPT
@@ -51,6 +55,8 @@ class Bench:
             raise Error(f"--scale {self.scale:g}: must be above 0 and at most 4; 1 is the table's own size")
         if not 1 <= self.repeats <= 100:
             raise Error(f"--repeats {self.repeats}: must be 1 to 100; 5 is usual")
+        if self.plot is not None:
+            require_plots("leave out --plot")
         settings = Settings(self.arch, self.peer_script, self.scale, self.repeats)
         console = Console()
         parts = [profile] if self.profile else [PARTS[name] for name in self.rows]
@@ -71,6 +77,8 @@ class Bench:
                 "rows": [row.as_dict() for row in found],
             }
             write_json(self.json, data)
+        if self.plot is not None:
+            write_bytes(self.plot, draw([row for row in found if row.particles]))
 
 
 def table(rows: list[Row]) -> Table:

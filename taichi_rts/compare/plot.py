@@ -17,11 +17,11 @@ MARKERS = "osD^vPX"
 AXES = {"wall": "wall time of the solver [s]", "updates": "particle updates"}
 
 
-def require_plots() -> None:
+def require_plots(otherwise: str = "give --no-plot") -> None:
     """Raise `OutputError` if the extra is not installed, before any work is done."""
     if importlib.util.find_spec("matplotlib") is None:
         raise OutputError(
-            "the plot needs the package matplotlib; run: pip install 'taichi_rts[plots]', or give --no-plot"
+            f"the plot needs the package matplotlib; run: pip install 'taichi_rts[plots]', or {otherwise}"
         )
 
 

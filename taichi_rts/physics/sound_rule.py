@@ -48,6 +48,7 @@ class SoundRule:
         self.geometry = grid.geometry
         self.maxima = BlockMaxima(scene, particles, grid)
         self.around = Surroundings(grid)
+        grid.track_vacated()
         self.cap = scene.wave_speed
         self.floor = scene.least_wave_speed
         self.rest_density = scene.rest_density

@@ -76,7 +76,7 @@ class Schedule:
     def __init__(self, particles: Particles, grid: BlockGrid) -> None:
         self.particles = particles
         self.grid = grid
-        self.due = ti.field(ti.i32, particles.capacity)
+        self.due = grid.rank  # which only a sort needs, and after a sort the list is made anew
         self.due_count = ti.field(ti.i32, ())
         self.read_at = ti.field(ti.i32, grid.geometry.blocks)
         self.steps = 0

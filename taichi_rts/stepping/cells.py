@@ -32,8 +32,8 @@ class Cells(Schedule):
         """Tick of each cell: the end of its youngest particle's step; `EMPTY` where there is none."""
         self.step = ti.field(ti.i32, blocks)
         """Shortest step [ticks] of each cell's particles."""
-        self.proposal = ti.field(ti.i32, blocks)
         self.ready = ti.field(ti.i32, blocks)
+        self.proposal = self.ready  # nobody asks who was ready once the next steps are proposed
         self.claim = ti.field(ti.i32, blocks)
         self.block_due = ti.field(ti.i32, blocks)
         self.due_start = ti.field(ti.i32, blocks + 1)
@@ -56,7 +56,6 @@ class Cells(Schedule):
         for block in range(self.blocks):
             self.time[block] = self.EMPTY
             self.step[block] = self.EMPTY
-            self.proposal[block] = self.EMPTY
             self.ready[block] = self.EMPTY
             self.claim[block] = self.EMPTY
             self.block_due[block] = 0

@@ -78,6 +78,7 @@ class RegionalSchedule(Schedule):
         self.raw_level.fill(BlockLimiter.EMPTY)
         self.block_level.fill(BlockLimiter.EMPTY)
         self.read_at.fill(-1)
+        grid.track_vacated()
         if self.aligned:
             grid.track_arrivals()
             self.last_level = ti.field(ti.i32, blocks)

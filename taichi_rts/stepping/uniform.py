@@ -74,6 +74,7 @@ class UniformSchedule(Schedule):
 
     def __init__(self, particles: Particles, grid: BlockGrid) -> None:
         super().__init__(particles, grid)
+        self.due = ti.field(ti.i32, particles.capacity)
         particles.level.fill(1)
         self.due_count = particles.alive
         self.mark_all()

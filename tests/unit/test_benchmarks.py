@@ -5,6 +5,7 @@ import taichi_rts as rts
 from taichi_rts.benchmarks import peers, timing
 from taichi_rts.benchmarks.command import Bench, verdict
 from taichi_rts.benchmarks.memory import memory_of
+from taichi_rts.benchmarks.plot import draw
 from taichi_rts.benchmarks.rows import Row, Settings, millions
 from taichi_rts.benchmarks.scenes import peers_dam_break
 from taichi_rts.cli import main
@@ -57,3 +58,11 @@ def test_memory_counts_every_field_once(taichi_cpu, unstarted):
 def test_without_the_peer_nothing_is_run(tmp_path):
     assert not peers.peer_is_there(tmp_path / "missing.py")
     assert Bench().peer_script == peers.SCRIPT
+
+
+def test_the_plot_has_a_line_for_each_curve():
+    rows = [Row(name, "", 100.0 + n, "ns", particles=1000 * 2**n) for name in ("uniform", "regional") for n in range(4)]
+    size = np.frombuffer(draw(rows)[16:24], ">u4")  # width and height in the header of the PNG
+    assert size.tolist() == [980, 560]
+    assert draw(rows) != draw(rows[:4])
+    assert len(draw([])) > 1000

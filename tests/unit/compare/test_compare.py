@@ -64,7 +64,9 @@ def test_a_comparison_from_the_command_line(tmp_path, capsys, quick_jobs, monkey
     assert runs["uniform λ=0.1333"]["role"] == "base step"
     assert sum(run["role"] == "largest stable" for run in runs.values()) == 1
     floor = report["scenes"][0]["floor"]["velocities"]
-    assert 0.0 < floor < runs["uniform λ=0.1333"]["errors"]["velocities"] < runs["uniform λ=0.4"]["errors"]["velocities"]
+    assert (
+        0.0 < floor < runs["uniform λ=0.1333"]["errors"]["velocities"] < runs["uniform λ=0.4"]["errors"]["velocities"]
+    )
     regional = runs["regional λ=0.4"]
     assert regional["costs"]["pair_interactions"] > 5 * regional["costs"]["particle_updates"]
     assert len(regional["costs"]["wall_seconds_all"]) == 2
