@@ -1,6 +1,6 @@
 """Measures what the defaults rest on and prints the tables of docs/defaults.md: python tests/benchmarks/evidence.py [part ...].
 
-Parts: pool, dam, walls, front. All of it takes about 15 minutes on 2 cores.
+Parts: pool, pools, dam, walls, front. All of it takes about 20 minutes on 2 cores.
 """
 
 import sys
@@ -21,8 +21,10 @@ STEPPERS = {
     "uniform 0.7": rts.Uniform(courant=0.7),
     "uniform 0.8": rts.Uniform(courant=0.8),
     "regional, defaults": rts.Regional(),
-    "regional, 2 levels at 0.3": rts.Regional(courant=0.3),
+    "regional, longest step 0.4": rts.Regional(courant=0.4 / 3),
+    "regional, 2 levels": rts.Regional(levels=2),
     "regional, paper": rts.Regional(preset="paper"),
+    "regional, paper, aligned": rts.Regional(preset="paper", steps="half_octaves"),
     "regional, paper, lambda_f 0.25": rts.Regional(preset="paper", lambda_f=0.25),
 }
 
@@ -35,6 +37,38 @@ def pool(stepper):
         sim.advance_to(time)
         speeds.append(np.sqrt((sim.velocities() ** 2).sum(axis=1).mean() / (9.81 * 0.5)))
     return *speeds, 2.0 * sim.positions()[:, 1].mean() / 0.5
+
+
+POOLS = {
+    "still_pool, 4000": (rts.load_scene("still_pool"), 0.5),
+    "still_pool, 500": (rts.load_scene("still_pool", spacing=0.1), 0.5),
+    "2D, 1250": (rts.Scene(domain=rts.Box((0, 0), (1, 1)), fluids=[rts.Block((0, 0), (1, 0.5))], spacing=0.02), 0.5),
+    "2D, 500": (rts.Scene(domain=rts.Box((0, 0), (2, 1)), fluids=[rts.Block((0, 0), (2, 0.4))], spacing=0.04), 0.4),
+    "3D, 2016": (
+        rts.Scene(
+            domain=rts.Box((0, 0, 0), (0.6, 1, 0.6)), fluids=[rts.Block((0, 0, 0), (0.6, 0.7, 0.6))], spacing=0.05
+        ),
+        0.7,
+    ),
+    "3D, 1620": (
+        rts.Scene(
+            domain=rts.Box((0, 0, 0), (0.9, 1, 0.5)), fluids=[rts.Block((0, 0, 0), (0.9, 0.45, 0.5))], spacing=0.05
+        ),
+        0.45,
+    ),
+}
+
+
+def pools(stepper):
+    """Return rms speed over sqrt(gH) of each of `POOLS`, the mean of 31 looks from 2 to 5 s."""
+    found = []
+    for scene, depth in POOLS.values():
+        sim, speeds = rts.Simulation(scene, stepper), []
+        for time in np.linspace(2.0, 5.0, 31):
+            sim.advance_to(time)
+            speeds.append(np.sqrt((sim.velocities() ** 2).sum(axis=1).mean() / (9.81 * depth)))
+        found.append(np.mean(speeds))
+    return found
 
 
 def dam(stepper, spacing=0.05, end=1.5):
@@ -76,11 +110,11 @@ def show(name, values):
 
 if __name__ == "__main__":
     rts.init("cpu")
-    parts = sys.argv[1:] or ["pool", "dam", "front", "walls"]
+    parts = sys.argv[1:] or ["pool", "pools", "dam", "front", "walls"]
     for part in parts:
         print(f"# {part}")
         if part == "walls":
             walls()
         else:
             for label, choice in STEPPERS.items():
-                show(label, {"pool": pool, "dam": dam, "front": front}[part](choice))
+                show(label, {"pool": pool, "pools": pools, "dam": dam, "front": front}[part](choice))
