@@ -175,11 +175,11 @@ class Simulation:
         self._gravity_work = 0.0
         self._initial_momentum = self.momentum()
         began = clock.perf_counter()
+        self._update_grid(self.timeline.now, self.timeline.tick)  # so that the first step puts them in this order
         self._start()
         self.setup_seconds = clock.perf_counter() - began
 
     def _start(self) -> None:
-        self._update_grid(self.timeline.now, self.timeline.tick)  # so that the first step puts them in this order
         self.step()  # lines 1-2: validity 0, so everybody is due now, where the first forces are evaluated
         self.schedule.take_counts()
         self.schedule.begin(

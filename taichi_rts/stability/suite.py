@@ -23,7 +23,7 @@ from taichi_rts.stability.demands import demanded_density
 from taichi_rts.stability.rerun import Rerun
 from taichi_rts.stability.survival import Outcome, largest_stable, watch
 from taichi_rts.stepping.base import Stepper
-from taichi_rts.stepping.regional import LARGEST_COURANT
+from taichi_rts.stepping.regional import REGIONAL_SOUND as SOUND_DEFAULTS
 
 LOWEST, HIGHEST = 0.05, 2.0  # courants between which the largest stable one is looked for; steppers take no more than 2
 REFERENCE_COURANTS = (0.1, 0.05, 0.025)
@@ -79,7 +79,7 @@ SETTINGS: tuple[Setting, ...] = (
         rts.Asynchronous().longest_courant,
     ),
     Setting("adaptive_c", lambda c: rts.Uniform(courant=c, adaptive=True), rts.Uniform().courant, REGIONAL_SOUND),
-    Setting("regional_c", lambda c: rts.Regional(courant=c), LARGEST_COURANT, REGIONAL_SOUND),
+    Setting("regional_c", lambda c: rts.Regional(courant=c), SOUND_DEFAULTS["courant"], REGIONAL_SOUND),
     Setting(
         "asynchronous_c", lambda c: rts.Asynchronous(courant=c), rts.Asynchronous().longest_courant, REGIONAL_SOUND
     ),

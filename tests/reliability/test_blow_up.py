@@ -88,7 +88,8 @@ def test_a_number_that_is_none(tmp_path, start_taichi, quick):
         guard.look()
         assert list(guard.found) == ["broken"]  # of several, one that is whole goes on
         assert diagnose(other) is None
-        other.particles.rho[3] = 2.5 * scene.rest_density
+        place = other.particles.identity.to_numpy().tolist().index(3)
+        other.particles.rho[place] = 2.5 * scene.rest_density
         assert "density 2.5 of rest is not between 0.02 and 2" in diagnose(other).exceeded
         with pytest.raises(
             rts.SimulationDivergedError, match=r"at t = 0 s particle 3 .* density 2\.5 of rest is not between"

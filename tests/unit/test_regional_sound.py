@@ -145,9 +145,9 @@ def test_the_paper_has_one_sound_speed():
 def test_levels_reach_from_the_cap_to_the_floor(steps, levels):
     scene = tank(rts.Block((0, 0), (1, 0.5)), sound_speed=SOUND)
     full = rts.Regional(steps=steps).in_scene(scene)
-    assert (full.levels, full.courant, full.limiter) == (levels, 0.6, True)
+    assert (full.levels, full.courant, full.limiter) == (levels, 0.4, True)
     assert full.steps == (steps or "half_octaves")
-    assert rts.Regional().timeline(scene).tick == pytest.approx(0.6 * R / CAP)
+    assert rts.Regional().timeline(scene).tick == pytest.approx(0.4 * R / CAP)
     assert rts.Regional(levels=4).in_scene(scene).levels == 4
 
 
