@@ -8,7 +8,7 @@ import taichi_rts as rts
 from taichi_rts.handover import Snapshot
 from taichi_rts.stepping.timeline import MAX_TICKS
 
-TICKS = 64
+TICKS = 72  # a multiple of all steps, as is `MAX_TICKS`: steps that are aligned then meet the same phase
 
 
 @pytest.mark.slow
