@@ -115,9 +115,8 @@ class RegionalSchedule(Schedule):
     def begin(self, timeline: Timeline, target: int) -> bool:
         """Set the clock to the next step at which somebody may be due."""
         begun = super().begin(timeline, target)
-        self.steps = (
-            timeline.now if begun else max(self.steps, target)
-        )  # those in which nobody is due have passed as well
+        # Those in which nobody is due have passed as well.
+        self.steps = timeline.now if begun else max(self.steps, target)
         return begun
 
     def next_ticks(self) -> int:
