@@ -12,6 +12,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_rts.backend import Backend, on_cpu
+from taichi_rts.resorting import Resorting
 from taichi_rts.scan import ExclusiveScan
 
 CELLS_PER_BLOCK = 2  # measured: 1, 2, 4, 8 cells take 225, 203, 269, 321 ns per particle and core in a density pass
@@ -179,10 +180,25 @@ class BlockGrid:
     somebody, ascending, `occupied_count[None]` of them.
 
     Within a cell particles stand in order of their id, so the result depends on positions alone: not on threads, not on
-    history. Work: two passes over the particles, two over the cells.
+    history. On a GPU it is a counting sort, with two passes over the particles and two over the cells; on a CPU `Resorting`
+    changes what was there.
     """
 
-    transient = frozenset({"rank", "cell_count", "vacated", "vacated_count", "occupied_flag", "occupied_start"})
+    cells_each = CELLS_PER_BLOCK
+    transient = frozenset(
+        {
+            "rank",
+            "cell_count",
+            "vacated",
+            "vacated_count",
+            "serial",
+            "resorting",
+            "scan",
+            "occupied_flag",
+            "occupied_start",
+            "occupied_scan",
+        }
+    )
 
     def __init__(self, geometry: Geometry, count: int, alive: ti.Field | None = None) -> None:
         self.geometry = geometry
@@ -190,17 +206,19 @@ class BlockGrid:
         if alive is None:
             self.alive[None] = count
         self.cell_of = ti.field(ti.i32, count)
+        self.cell_of.fill(-1)
         self.rank = ti.field(ti.i32, count)
         self.order = ti.field(ti.i32, count)
         self.order.from_numpy(np.arange(count, dtype=np.int32))
         self.cell_count = ti.field(ti.i32, geometry.cells)
         self.start = ti.field(ti.i32, geometry.cells + 1)
-        self.scan = ExclusiveScan(self.cell_count, self.start)
         self.occupied = ti.field(ti.i32, geometry.blocks)
         self.serial = on_cpu()
         if self.serial:
+            self.resorting = Resorting(self, count)
             self.occupied_count = ti.field(ti.i32, ())
         else:
+            self.scan = ExclusiveScan(self.cell_count, self.start)
             self.occupied_flag = ti.field(ti.i32, geometry.blocks)
             self.occupied_start = ti.field(ti.i32, geometry.blocks + 1)
             self.occupied_scan = ExclusiveScan(self.occupied_flag, self.occupied_start)
@@ -208,9 +226,9 @@ class BlockGrid:
         self.tracks_arrivals = self.tracks_vacated = False
 
     def track_arrivals(self) -> None:
-        """From now on note in `arrived`, (blocks,), which blocks a particle has come into; who reads it sets it back to 0.
+        """From now on note in `arrived`, (blocks,), by a 1 which blocks a particle has come into; who reads it changes it.
 
-        Now and then, after particles were reordered in memory, all blocks count. Has to be called before the first `update`.
+        Has to be called before the first `update`.
         """
         self.tracks_arrivals = True
         self.arrived = ti.field(ti.i32, self.geometry.blocks)
@@ -225,36 +243,70 @@ class BlockGrid:
             self.vacated = ti.field(ti.i32, self.geometry.blocks)
             self.vacated_count = ti.field(ti.i32, ())
 
+    def forget(self) -> None:
+        """Take note that particles have other entries now: nobody is where its entry was, so all count as new in their blocks."""
+        self.cell_of.fill(-1)
+        self.start.fill(0)
+        self.restored()
+
+    def restored(self) -> None:
+        """Take note that what is not transient has been put back to what it was at another time."""
+        if self.serial:
+            self.resorting.restored()
+
     def update(self, locate: Callable[..., Any], identity: ti.Field, *time: Any) -> None:
-        """Sort anew. `locate(*time)` is a kernel that calls `insert` once for every particle."""
+        """Sort anew. `locate(*time)` is a kernel that calls `insert` once for every particle, or `insert_all`."""
         locate(*time)
         self.place_particles(identity)
+
+    @ti.func
+    def insert_all(self, locate: ti.template(), now, tick):
+        """`insert` every particle `i` at `locate(i, now, tick)` [m]; to be called at the outermost level of a kernel."""
+        if ti.static(self.serial):
+            self.resorting.insert_all(locate, now, tick)
+        else:
+            for i in range(self.alive[None]):
+                self.insert(i, locate(i, now, tick))
 
     @ti.func
     def insert(self, i, x):
         """Count particle `i` at position `x` [m] into its cell."""
         cell = self.geometry.cell(x)
-        if ti.static(self.tracks_arrivals):
-            before = self.cell_of[i]
-            if before != cell:
-                if self.block_of(before) != self.block_of(cell):
-                    self.arrived[self.block_of(cell)] = 1
+        if self.cell_of[i] != cell:
+            self.change(i, cell)
+        if ti.static(not self.serial):
+            self.rank[i] = ti.atomic_add(self.cell_count[cell], 1)
+
+    @ti.func
+    def change(self, i, cell):
+        """Note that particle `i`, which was in another cell, is in `cell` now."""
+        before = self.cell_of[i]
         self.cell_of[i] = cell
-        self.rank[i] = ti.atomic_add(self.cell_count[cell], 1)
+        if ti.static(self.tracks_arrivals):
+            if self.block_of(before) != self.block_of(cell):
+                self.arrived[self.block_of(cell)] = 1
+        if ti.static(self.serial):
+            self.resorting.insert(i, before, cell)
 
     @ti.kernel
     def place_particles(
         self, identity: ti.template()
     ):  # many loops in one kernel: a launch costs more than some of them
-        self.scan.scan()
-        for i in range(self.alive[None]):
-            self.order[self.start[self.cell_of[i]] + self.rank[i]] = i
-        if ti.static(self.tracks_vacated):
-            self.list_vacated()
-        self.list_occupied()
-        for m in range(self.occupied_count[None]):
-            for part in range(CELLS_PER_BLOCK):
-                self.sort_cell(identity, self.occupied[m] * CELLS_PER_BLOCK + part)
+        if ti.static(self.serial):
+            self.resorting.sort(identity)
+            if ti.static(self.tracks_vacated):
+                self.list_vacated()
+            self.resorting.finish()
+        else:
+            self.scan.scan()
+            for i in range(self.alive[None]):
+                self.order[self.start[self.cell_of[i]] + self.rank[i]] = i
+            if ti.static(self.tracks_vacated):
+                self.list_vacated()
+            self.list_occupied()
+            for m in range(self.occupied_count[None]):
+                for part in range(CELLS_PER_BLOCK):
+                    self.sort_cell(identity, self.occupied[m] * CELLS_PER_BLOCK + part)
 
     @ti.func
     def sort_cell(self, identity: ti.template(), cell):
@@ -273,44 +325,20 @@ class BlockGrid:
     @ti.func
     def list_vacated(self):
         """Find the blocks that were occupied and no longer are."""
-        if ti.static(self.serial):
-            ti.loop_config(serialize=True)
-            for _ in range(1):
-                gone = 0
-                for m in range(self.occupied_count[None]):
-                    if self.is_empty(self.occupied[m]):
-                        self.vacated[gone] = self.occupied[m]
-                        gone += 1
-                self.vacated_count[None] = gone
-        else:
-            self.vacated_count[None] = 0
-            for m in range(self.occupied_count[None]):
-                if self.is_empty(self.occupied[m]):
-                    self.vacated[ti.atomic_add(self.vacated_count[None], 1)] = self.occupied[m]
+        self.vacated_count[None] = 0
+        for m in range(self.occupied_count[None]):
+            if self.is_empty(self.occupied[m]):
+                self.vacated[ti.atomic_add(self.vacated_count[None], 1)] = self.occupied[m]
 
     @ti.func
     def list_occupied(self):
         """Find the blocks that are occupied."""
-        if ti.static(self.serial):
-            ti.loop_config(serialize=True)
-            for _ in range(1):
-                count = 0
-                for row in range(self.geometry.blocks // self.geometry.shape[0]):
-                    cell = row * self.geometry.row_length
-                    if self.start[cell] < self.start[cell + self.geometry.row_length]:
-                        for column in range(self.geometry.shape[0]):
-                            block = row * self.geometry.shape[0] + column
-                            if not self.is_empty(block):
-                                self.occupied[count] = block
-                                count += 1
-                self.occupied_count[None] = count
-        else:
-            for block in range(self.geometry.blocks):
-                self.occupied_flag[block] = ti.cast(not self.is_empty(block), ti.i32)
-            self.occupied_scan.scan()
-            for block in range(self.geometry.blocks):
-                if self.occupied_flag[block] == 1:
-                    self.occupied[self.occupied_start[block]] = block
+        for block in range(self.geometry.blocks):
+            self.occupied_flag[block] = ti.cast(not self.is_empty(block), ti.i32)
+        self.occupied_scan.scan()
+        for block in range(self.geometry.blocks):
+            if self.occupied_flag[block] == 1:
+                self.occupied[self.occupied_start[block]] = block
 
     @ti.func
     def is_empty(self, block):

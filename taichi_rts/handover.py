@@ -82,7 +82,7 @@ class Snapshot:
             sim.outlets.looks = 0
         sim._sorts = 0
         sim.grid.order.from_numpy(np.arange(sim.particles.capacity, dtype=np.int32))
-        sim.grid.cell_of.fill(-1)  # nobody is where its entry was, so all count as new in their blocks
+        sim.grid.forget()
         sim.schedule.read_at.fill(0)
         for counter in (
             sim.motion.stopped,

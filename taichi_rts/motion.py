@@ -122,8 +122,12 @@ class Motion:
     @ti.kernel
     def locate_particles(self, now: ti.i32, tick: float):
         """Algorithm 1, line 4: count every particle into the cell of its present position."""
-        for i in range(self.particles.alive[None]):
-            self.grid.insert(i, self.position(i, self.elapsed(i, now, tick), tick))
+        self.grid.insert_all(self.present_position, now, tick)
+
+    @ti.func
+    def present_position(self, i, now, tick):
+        """Position [m] of particle `i` at tick `now`."""
+        return self.position(i, self.elapsed(i, now, tick), tick)
 
     @ti.kernel
     def predict_neighbourhood(self, read_at: ti.template(), now: ti.i32, tick: float):

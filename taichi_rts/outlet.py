@@ -56,7 +56,7 @@ class Outlets:
         self.scan.run()
         self.line_up(particles.count - count, states, now, tick)
         particles.shrink(self.grid.order, particles.count - count)
-        self.grid.cell_of.fill(-1)  # nobody is where its entry was, so all count as new in their blocks
+        self.grid.forget()
         for number in range(len(self.removed)):
             self.removed[number] += int((states[:, 0] == number).sum())
         total = states.astype(np.float64)

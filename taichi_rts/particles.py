@@ -164,6 +164,10 @@ class Particles:
         """Take fields of others, (capacity,) or more, to put values down while they are reordered; the more, the quicker."""
         self.real_scratch, self.integer_scratch = reals, integer
 
+    def carry(self, integer: ti.Field) -> None:
+        """Have another field of integers, (capacity,), reordered along with these."""
+        self.integers.append(integer)
+
     def reorder(self, order: ti.Field) -> None:
         """Move entry `order[k]` of every field to place k, then make `order` the identity. Writes to what was borrowed."""
         self.reorder_fields(order)

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from taichi_rts import resorting
 from taichi_rts.backend import Backend, has_vulkan_hardware
 from taichi_rts.errors import ResourceError
 from taichi_rts.grid import CELLS_PER_BLOCK
@@ -29,7 +30,7 @@ LINING = 10 * SAMPLING
 """Bytes of the host per boundary particle of an obstacle and dimension: they are chosen from about ten times as many points."""
 COMPILED = 400 << 20
 """Bytes that Python, the compiler and compiled kernels take besides."""
-BLOCK_INTEGERS = {"uniform": 2, "regional": 9, "asynchronous": 9}
+BLOCK_INTEGERS = {"uniform": 2, "regional": 10, "asynchronous": 9}
 """Fields of 32-bit integers that each stepper has with an entry for each block."""
 FIXED = 1 << 14
 """Bytes of fields whose size does not depend on the scene, about."""
@@ -83,7 +84,7 @@ def device_bytes(
         + (size.walls + _lining(scene, spacing)) * real * (2 * dim + 1)
         + size.blocks * per_block
         + nodes * real
-        + (windows * real * reals_seen if on_cpu else 0.0)
+        + (windows * real * reals_seen + INTEGER * resorting.integers(size.particles, size.blocks) if on_cpu else 0.0)
         + FIXED
     )
 

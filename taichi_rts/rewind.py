@@ -18,6 +18,7 @@ class Rewind:
 
     def __init__(self, sim: Any) -> None:
         state = State(sim)
+        self.grid = sim.grid
         self.fields = list(state.fields.values())
         self.owners: list[tuple[dict[str, Any], dict[str, Any], frozenset[str]]] = []
         values: dict[str, dict[str, Any]] = {path: {} for path in state.owners}
@@ -35,6 +36,7 @@ class Rewind:
             for late in [name for name in owner if name not in names]:
                 del owner[late]  # hides what the class says, such as `Schedule.needs_sorting`
             owner.update(copy.deepcopy(values))
+        self.grid.restored()
 
     @ti.kernel
     def save(self):

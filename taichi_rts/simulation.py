@@ -124,6 +124,7 @@ class Simulation:
             self.medium = dataclasses.replace(self.medium, equation_of_state=law)
         self.near = Neighbourhood(capacity, scene.dim, backend, needs, geometry)
         self.particles.borrow(self.near.spare, self.grid.rank)
+        self.particles.carry(self.grid.cell_of)
         self._obstacle_layers = start.obstacles
         self._fluids = start.fluids
         self._meter: ForceMeter | None = None
@@ -195,7 +196,7 @@ class Simulation:
             if schedule.needs_sorting:
                 self._sort(now, tick)  # line 4
             if self.sound and schedule.needs_sound:
-                self.sound.update(schedule.read_at, now, tick)
+                self.sound.update(schedule, now, tick)
             schedule.select(now, tick)  # lines 5-16
             self.motion.predict_neighbourhood(schedule.read_at, now, tick)  # lines 25-26, where somebody looks
         with self.overhead.due:

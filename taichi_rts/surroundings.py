@@ -16,6 +16,8 @@ class Surroundings:
     reads one more as it goes on along the run: 9 reads instead of 26.
     """
 
+    transient = frozenset({"in_runs"})
+
     def __init__(self, grid: BlockGrid) -> None:
         self.grid = grid
         self.geometry = grid.geometry

@@ -183,7 +183,7 @@ class NeighbourSum:
     offered too, so they must vanish there by themselves.
     """
 
-    transient = frozenset({"dtype", "copies", "wall_copies"})
+    transient = frozenset({"dtype", "copies", "wall_copies", "windows", "by_windows"})
 
     def __init__(
         self,

@@ -29,6 +29,8 @@ class BlockMaxima:
         ]
         """Axis, range of places [m] and largest speed [m/s] of each moving face."""
         self.paths = [Path(body) for body in bodies(scene)]
+        self.moving = bool(self.walls or self.paths)
+        """Whether limits change although no particle does."""
         self.horizon = scene.support / scene.least_wave_speed  # [s]: more than any step
         self.margin = 0.5 * math.hypot(*self.geometry.sides) + max(self.geometry.sides)
         """Half a block's diagonal and a block [m]: how far the middle of one may be from a body that its fluid meets."""

@@ -38,6 +38,8 @@ class RegionalSchedule(Schedule):
     `block_level` is the region of each block (`BlockLimiter.EMPTY` where there is no particle).
     """
 
+    transient = frozenset({"scan"})
+
     def __init__(self, stepper: "Regional", scene: Scene, particles: Particles, grid: BlockGrid) -> None:
         super().__init__(particles, grid)
         self.scene = scene
@@ -87,6 +89,14 @@ class RegionalSchedule(Schedule):
             """Particles times base steps that are not in `occupancy` yet: one by one is quicker than all in one place."""
         else:
             self.flag = ti.field(ti.i32, particles.capacity)
+        self.remembers = self.aligned and not self.by_sound and self.levels > 1 and not self.maxima.moving
+        if self.remembers:
+            self.wanted = ti.field(ti.i32, blocks)
+            """What each block allowed when it was last looked at.
+
+            Until somebody in it steps again speeds grow by constant accelerations, and the left side of Eq. 3 by no more than
+            lambda_f^2 (Eq. 2), 0.01 of 0.16.
+            """
         self.block_due = ti.field(ti.i32, blocks)
         self.due_start = ti.field(ti.i32, blocks + 1)
         if not grid.serial:
@@ -110,6 +120,7 @@ class RegionalSchedule(Schedule):
         if self.aligned:
             self.last_level.fill(BlockLimiter.EMPTY)
             self.held.fill(0)
+        self.block_due.fill(1)  # nothing is known of any block
         self.take_counts()
 
     def begin(self, timeline: Timeline, target: int) -> bool:
@@ -161,21 +172,35 @@ class RegionalSchedule(Schedule):
         for m in range(self.grid.occupied_count[None]):
             block = self.grid.occupied[m]
             level = 1
+            before = self.block_level[block]  # of the last step; who was empty has nothing to grow from
             if ti.static(self.levels == 1):
                 self.block_level[block] = level
             elif ti.static(self.by_sound):  # whose rule has reduced the block already
                 level = self.region_by_sound(block, tick, reach)
+            elif ti.static(self.remembers):
+                if before == BlockLimiter.EMPTY or self.has_stepped(block) or self.grid.arrived[block] == 1:
+                    self.wanted[block] = self.region_of(block, now, tick, reach)
+                level = self.wanted[block]
             else:
-                speed2, acceleration2, viscosity, density = self.maxima.of(block, now, tick)
-                level = self.region(tick, reach, speed2, acceleration2, viscosity, density)
+                level = self.region_of(block, now, tick, reach)
             if ti.static(self.limits):
-                before = self.block_level[block]  # of the last step; who was empty has nothing to grow from
                 if before != BlockLimiter.EMPTY:
                     if ti.static(self.aligned):
                         level = self.grown(level, before, now)
                     else:
                         level = self.limiter.settled(level, before, now)
             self.raw_level[block] = level
+
+    @ti.func
+    def has_stepped(self, block):
+        """Whether somebody in `block` was due in the last step."""
+        return self.block_due[block] > 0
+
+    @ti.func
+    def region_of(self, block, now, tick, reach):
+        """The largest n that the particles of `block` allow."""
+        speed2, acceleration2, viscosity, density = self.maxima.of(block, now, tick)
+        return self.region(tick, reach, speed2, acceleration2, viscosity, density)
 
     @ti.func
     def region(self, base_step, reach, speed2, acceleration2, viscosity, density):
@@ -267,15 +292,18 @@ class RegionalSchedule(Schedule):
                 self.occupancy[before] += self.held[block]
                 self.held[block] = 0
             due = now % level == 0 or level < before
-            if self.grid.arrived[block] > 0:
-                self.grid.arrived[block] = 0
+            arrived = self.grid.arrived[block]
+            if arrived == 1:
+                self.grid.arrived[block] = 2  # until all have the block's level
                 for k in range(first, end):
                     due = due or self.particles.level[self.grid.order[k]] > level
-            self.held[block] += (end - first) * passed
+            self.held[block] = self.held[block] + (end - first) * passed  # `+=` would be atomic
             if due:
                 count = end - first
-                for k in range(first, end):
-                    self.particles.level[self.grid.order[k]] = level
+                if level != before or arrived > 0:
+                    self.grid.arrived[block] = 0
+                    for k in range(first, end):
+                        self.particles.level[self.grid.order[k]] = level
                 self.updates[level] += count
             ti.atomic_min(self.until_next[None], level - now % level)
             self.block_due[block] = count

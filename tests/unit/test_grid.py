@@ -22,10 +22,12 @@ def cloud(dim, seed=0, count=150):
 
 @ti.data_oriented
 class SortedCloud:
-    def __init__(self, x, identity, periodic=None):
+    def __init__(self, x, identity, periodic=None, vacates=False):
         self.count, dim = x.shape
         self.geometry = Geometry((-0.1,) * dim, (0.8,) * dim, SUPPORT, periodic=periodic)
         self.grid = BlockGrid(self.geometry, self.count)
+        if vacates:
+            self.grid.track_vacated()
         self.x = vector_field(dim, ti.f64, self.count)
         self.sorted = vector_field(dim, ti.f64, self.count + CPU.lanes)
         self.identity = ti.field(ti.i32, self.count)
@@ -57,6 +59,49 @@ def test_counting_sort_is_stable_in_cell_and_identity(taichi_cpu_f64, dim):
         assert cloud_.grid.cell_of.to_numpy().tolist() == cell.tolist()
         start = np.searchsorted(np.sort(cell), np.arange(cloud_.geometry.cells + 1))
         assert cloud_.grid.start.to_numpy().tolist() == start.tolist()
+
+
+def sorted_as(cloud_, points, identity):
+    """Whether order, cells, their starts, and occupied and vacated blocks are what NumPy makes of `points`."""
+    grid, cell = cloud_.grid, cloud_.geometry.cell_numpy(points)
+    before = set(grid.occupied.to_numpy()[: grid.occupied_count[None]].tolist())
+    order = cloud_.sort(points)
+    now = np.unique(cell // CELLS_PER_BLOCK)
+    assert order.tolist() == np.lexsort((identity, cell)).tolist()
+    assert grid.cell_of.to_numpy().tolist() == cell.tolist()
+    assert (
+        grid.start.to_numpy().tolist() == np.searchsorted(np.sort(cell), np.arange(cloud_.geometry.cells + 1)).tolist()
+    )
+    assert grid.occupied.to_numpy()[: grid.occupied_count[None]].tolist() == now.tolist()
+    vacated = grid.vacated.to_numpy()[: grid.vacated_count[None]].tolist()
+    assert sorted(vacated) == sorted(before - set(now.tolist()))
+
+
+@pytest.mark.parametrize(
+    ("share", "count"),
+    [(0.0, 6000), (0.01, 6000), (0.2, 6000), (0.6, 6000), (0.2, 900)],
+    ids=["nobody", "few", "many", "more than there is room for in the list", "always room for all"],
+)
+def test_particles_that_change_their_cells_are_merged_into_the_others(taichi_cpu_f64, share, count):
+    rng = np.random.default_rng(5)
+    x = rng.uniform(-0.1, 0.3, (count, 3))
+    identity = rng.permutation(len(x))
+    cloud_ = SortedCloud(x, identity, vacates=True)
+    room = cloud_.grid.resorting.room
+    for _ in range(4):
+        moves = rng.random(len(x)) < share
+        x = np.where(moves[:, None], rng.uniform(-0.1, 0.8, x.shape), x)
+        sorted_as(cloud_, x, identity)
+    assert (moves.sum() > room) == (share > 0.5)
+    x[:, 1] = np.where(x[:, 1] > 0.5, -0.05, x[:, 1])  # some blocks are left by all
+    sorted_as(cloud_, x, identity)
+    cloud_.grid.forget()
+    sorted_as(cloud_, x[::-1].copy(), identity)
+    x[:, 0] = np.minimum(x[:, 0], 0.2)
+    cloud_.grid.forget()
+    sorted_as(cloud_, x, identity)
+    cloud_.grid.restored()
+    sorted_as(cloud_, x, identity)
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -221,3 +221,19 @@ def test_differences_are_named():
     assert differences({"a": 1, "b": 2}, {"a": 1, "b": 3, "c": 4}) == "b 2 there and 3 here, c None there and 4 here"
     assert differences({"a": 1}, {"a": 1}) == ""
     assert differences({"name": "x", "b": 2}, {"name": "y", "b": 3}) == "name 'x' there and 'y' here"
+
+
+def test_another_arch_goes_on_with_it(start_taichi, taichi_vulkan, tmp_path):
+    """What serves one arch alone, such as windows and lists of a sort, is not in the file."""
+    scene = rts.load_scene("dam_break_2d", particles="1k", sound_speed="regional")
+    ends = []
+    sim = rts.Simulation(scene, rts.Regional())
+    sim.advance_to(EARLY)
+    checkpoint.save_checkpoint(sim, tmp_path / "vulkan.npz")
+    sim.advance_to(LATE)
+    ends.append(sim.positions())
+    with start_taichi("cpu", "f32"):
+        sim = checkpoint.load_checkpoint(tmp_path / "vulkan.npz")
+        sim.advance_to(LATE)
+        ends.append(sim.positions())
+    assert np.abs(ends[1] - ends[0]).max() < 1e-3 * scene.spacing
