@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import taichi as ti
 
+from taichi_rts.backend import threads
 from taichi_rts.grid import BlockGrid
 from taichi_rts.particles import Particles, Rows
 from taichi_rts.scan import ExclusiveScan
@@ -38,7 +39,7 @@ class RegionalSchedule(Schedule):
     `block_level` is the region of each block (`BlockLimiter.EMPTY` where there is no particle).
     """
 
-    transient = frozenset({"scan"})
+    transient = frozenset({"scan", "occupancy", "updates", "rows"})
 
     def __init__(self, stepper: "Regional", scene: Scene, particles: Particles, grid: BlockGrid) -> None:
         super().__init__(particles, grid)
@@ -102,8 +103,10 @@ class RegionalSchedule(Schedule):
         if not grid.serial:
             self.scan = ExclusiveScan(self.block_due, self.due_start)
             self.due_count = self.scan.total
-        self.occupancy = ti.field(ti.i32, self.levels + 1)
-        self.updates = ti.field(ti.i32, self.levels + 1)
+        self.rows = threads() if grid.serial else 1
+        width = -(-(self.levels + 1) // 16) * 16
+        self.occupancy, self.updates = (ti.field(ti.i32, (self.rows, width)) for _ in range(2))
+        """Particles and updates by level, of each thread of a CPU for itself: in one place they would wait for each other."""
 
     def retime(self, stepper: "Regional", timeline: Timeline | None = None) -> bool:
         """Take another courant."""
@@ -149,7 +152,7 @@ class RegionalSchedule(Schedule):
             self.update_aligned_validity(now, passed)
         else:
             self.update_validity(now, passed)
-        self.find_due_starts()
+        self.find_due_starts(now)
         self.list_due()
 
     @ti.func
@@ -159,7 +162,7 @@ class RegionalSchedule(Schedule):
             block = self.grid.vacated[m]
             if ti.static(self.aligned):
                 if self.held[block] > 0:
-                    self.occupancy[self.last_level[block]] += self.held[block]
+                    self.add(self.occupancy, self.last_level[block], self.held[block])
                     self.held[block] = 0
                 self.last_level[block] = BlockLimiter.EMPTY
             self.raw_level[block] = self.block_level[block] = BlockLimiter.EMPTY
@@ -272,8 +275,17 @@ class RegionalSchedule(Schedule):
                 self.flag[k] = flag
                 count += flag
             self.block_due[block] = count
-            self.occupancy[level] += (end - first) * passed
-            self.updates[level] += count
+            self.add(self.occupancy, level, (end - first) * passed)
+            self.add(self.updates, level, count)
+
+    @ti.func
+    def add(self, counts: ti.template(), level, count):
+        """Add `count` to what is counted of `level`."""
+        if ti.static(self.grid.serial):
+            thread = ti.global_thread_idx()
+            counts[thread, level] = counts[thread, level] + count
+        else:
+            counts[0, level] += count
 
     @ti.func
     def update_aligned_validity(self, now, passed):
@@ -283,15 +295,18 @@ class RegionalSchedule(Schedule):
         Who comes with a shorter one steps with the block. Particles of other blocks need not be looked at.
         """
         self.until_next[None] = self.levels
+        ends = 0  # bit n - 1: whether steps of n base steps end now
+        for n in ti.static(self.lengths):
+            ends |= ti.cast(now % n == 0, ti.i32) << (n - 1)
         for m in range(self.grid.occupied_count[None]):
             block = self.grid.occupied[m]
             first, end = self.grid.first(block), self.grid.first(block + 1)
             level, before = self.block_level[block], self.last_level[block]
             count = 0
             if level != before and self.held[block] > 0:
-                self.occupancy[before] += self.held[block]
+                self.add(self.occupancy, before, self.held[block])
                 self.held[block] = 0
-            due = now % level == 0 or level < before
+            due = (ends >> (level - 1)) & 1 == 1 or level < before
             arrived = self.grid.arrived[block]
             if arrived == 1:
                 self.grid.arrived[block] = 2  # until all have the block's level
@@ -304,22 +319,34 @@ class RegionalSchedule(Schedule):
                     self.grid.arrived[block] = 0
                     for k in range(first, end):
                         self.particles.level[self.grid.order[k]] = level
-                self.updates[level] += count
-            ti.atomic_min(self.until_next[None], level - now % level)
+                self.add(self.updates, level, count)
+            if ti.static(not self.grid.serial):
+                ti.atomic_min(self.until_next[None], level - now % level)
             self.block_due[block] = count
             self.last_level[block] = level
 
     @ti.func
-    def find_due_starts(self):
-        """Find for every block where its due particles will be in the list, and how many there are in all."""
+    def find_due_starts(self, now):
+        """Find for every block where its due particles will be in the list, and how many there are in all.
+
+        On a CPU also when the next step ends: an atomic minimum over all blocks would take longer.
+        """
         if ti.static(self.grid.serial):
             ti.loop_config(serialize=True)
             for _ in range(1):
-                count = 0
+                count, present = 0, 0
                 for m in range(self.grid.occupied_count[None]):
-                    self.due_start[self.grid.occupied[m]] = count
-                    count += self.block_due[self.grid.occupied[m]]
+                    block = self.grid.occupied[m]
+                    self.due_start[block] = count
+                    count += self.block_due[block]
+                    present |= 1 << (self.block_level[block] - 1)
                 self.due_count[None] = count
+                if ti.static(self.aligned):
+                    until_next = self.levels
+                    for n in ti.static(self.lengths):
+                        if (present >> (n - 1)) & 1 == 1:
+                            until_next = ti.min(until_next, n - now % n)
+                    self.until_next[None] = until_next
         else:
             self.scan.scan()
 
@@ -359,7 +386,7 @@ class RegionalSchedule(Schedule):
     def count_held(self):
         for block in range(self.blocks):
             if self.held[block] > 0:
-                self.occupancy[self.last_level[block]] += self.held[block]
+                self.add(self.occupancy, self.last_level[block], self.held[block])
                 self.held[block] = 0
 
     def take_counts(self) -> tuple[list[int], list[int]]:
@@ -374,5 +401,7 @@ class RegionalSchedule(Schedule):
     @ti.kernel
     def read_counts(self, counts: Rows):
         for n in range(self.levels + 1):
-            counts[0, n], counts[1, n] = self.occupancy[n], self.updates[n]
-            self.occupancy[n] = self.updates[n] = 0
+            for row in range(self.rows):
+                counts[0, n] += self.occupancy[row, n]
+                counts[1, n] += self.updates[row, n]
+                self.occupancy[row, n] = self.updates[row, n] = 0
