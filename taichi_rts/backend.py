@@ -14,7 +14,10 @@ os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 
 import numpy as np
 import taichi as ti
+from taichi.lang import kernel_impl
+from taichi.lang.ast import ast_transformer_utils
 
+from taichi_rts import positions
 from taichi_rts.errors import BackendError
 
 ARCHES = ("cuda", "vulkan", "cpu")  # the order in which `auto` tries them
@@ -57,6 +60,7 @@ class Backend:
 
 
 _current: Backend | None = None
+positions.remember(ast_transformer_utils, kernel_impl)
 
 
 def init(arch: str = "auto", precision: str = "f32", **taichi_options: Any) -> Backend:
