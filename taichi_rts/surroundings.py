@@ -2,10 +2,10 @@
 
 import taichi as ti
 
-from taichi_rts.backend import CHUNK
+from taichi_rts.backend import CHUNK, threads
 from taichi_rts.grid import BlockGrid
 
-TASKS = 16  # shares of the occupied blocks that threads take one by one
+TASKS = 4  # shares of the occupied blocks for each thread; they are taken one by one
 
 
 @ti.data_oriented
@@ -16,12 +16,13 @@ class Surroundings:
     reads one more as it goes on along the run: 9 reads instead of 26.
     """
 
-    transient = frozenset({"in_runs"})
+    transient = frozenset({"in_runs", "tasks"})
 
     def __init__(self, grid: BlockGrid) -> None:
         self.grid = grid
         self.geometry = grid.geometry
         self.in_runs = grid.serial and not self.geometry.repeats
+        self.tasks = TASKS * threads()
         stride = self.geometry.block_strides
         beside = [dy * stride[1] for dy in (-1, 0, 1)]
         if self.geometry.dim == 3:
@@ -37,11 +38,11 @@ class Surroundings:
         beyond `rest`. To be called at the outermost level of a kernel, where its loops run in parallel.
         """
         if ti.static(self.in_runs):
-            for turn in range(TASKS * CHUNK):  # the first iteration of each chunk does a share
+            for turn in range(self.tasks * CHUNK):  # the first iteration of each chunk does a share
                 m, end = 0, 0
                 if turn % CHUNK == 0:
                     count = self.grid.occupied_count[None]
-                    m, end = count * (turn // CHUNK) // TASKS, count * (turn // CHUNK + 1) // TASKS
+                    m, end = count * (turn // CHUNK) // self.tasks, count * (turn // CHUNK + 1) // self.tasks
                 last = -1
                 before, own, here, next_own, next_here = rest, rest, rest, rest, rest
                 while m < end:

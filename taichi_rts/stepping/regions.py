@@ -68,15 +68,24 @@ class RegionalSchedule(Schedule):
         self.limiter = NeighbourLimiter(doubling=False)
         self.until_next = ti.field(ti.i32, ())
         self.now = 0
+        reach = NeighbourLimiter.RATIO if self.by_sound else 1  # the sound speed has spread by a block already
         ratio_sweeps = max(0, math.ceil(math.log2(self.levels)) - 1) if self.limits else 0
         if self.by_sound:  # whose sound speeds are graded already; forces are not, but reach no further
             ratio_sweeps = min(1, ratio_sweeps)
         grading_sweeps = max(0, self.levels - 2) if stepper.grading else 0
-        reach = NeighbourLimiter.RATIO if self.by_sound else 1  # the sound speed has spread by a block already
-        raw, final = self.raw_level, self.block_level
-        self.sweeps = [Sweep(self.beside, raw, final, reach, 0)] if self.levels > 1 else []
-        for factor, jump in ratio_sweeps * [(NeighbourLimiter.RATIO, 0)] + grading_sweeps * [(1, 1)]:
-            self.sweeps += [Sweep(self.beside, final, raw, factor, jump), Sweep(self.beside, raw, final, factor, jump)]
+        rules = [(reach, 0)] + ratio_sweeps * [(NeighbourLimiter.RATIO, 0)] + grading_sweeps * [(1, 1)]
+        if self.levels == 1:
+            rules = []
+        targets = [(self.block_level, self.raw_level)[n % 2] for n in range(len(rules))][
+            ::-1
+        ]  # the last is `block_level`
+        self.own_level = self.raw_level if len(rules) % 2 else self.block_level
+        """What each block allows itself, where the first sweep reads it."""
+        sources = [self.own_level, *targets[:-1]]
+        self.sweeps = [
+            Sweep(self.beside, source, target, *rule)
+            for source, target, rule in zip(sources, targets, rules, strict=False)
+        ]
         self.around = Surroundings(grid)
         self.raw_level.fill(BlockLimiter.EMPTY)
         self.block_level.fill(BlockLimiter.EMPTY)
@@ -177,7 +186,7 @@ class RegionalSchedule(Schedule):
             level = 1
             before = self.block_level[block]  # of the last step; who was empty has nothing to grow from
             if ti.static(self.levels == 1):
-                self.block_level[block] = level
+                level = 1
             elif ti.static(self.by_sound):  # whose rule has reduced the block already
                 level = self.region_by_sound(block, tick, reach)
             elif ti.static(self.remembers):
@@ -192,7 +201,7 @@ class RegionalSchedule(Schedule):
                         level = self.grown(level, before, now)
                     else:
                         level = self.limiter.settled(level, before, now)
-            self.raw_level[block] = level
+            self.own_level[block] = level
 
     @ti.func
     def has_stepped(self, block):

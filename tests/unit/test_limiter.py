@@ -74,7 +74,7 @@ def test_grading_leaves_jumps_of_one_and_only_lowers(taichi_cpu, levels):
     occupied = raw != EMPTY
     raw[occupied] = levels
     raw[np.flatnonzero(occupied)[[3, 100]]] = 1  # two fast blocks in a slow fluid
-    schedule.raw_level.from_numpy(raw)
+    schedule.own_level.from_numpy(raw)
     apply_minimum_region(schedule, np.flatnonzero(occupied))
     graded = schedule.block_level.to_numpy()
     assert (graded[~occupied] == EMPTY).all()
@@ -128,7 +128,7 @@ def test_the_limiter_of_regions_halves_the_step_at_most_from_block_to_block(taic
     occupied = raw != EMPTY
     raw[occupied] = 8
     raw[np.flatnonzero(occupied)[[3, 100]]] = 1
-    schedule.raw_level.from_numpy(raw)
+    schedule.own_level.from_numpy(raw)
     apply_minimum_region(schedule, np.flatnonzero(occupied))
     limited = schedule.block_level.to_numpy()
     assert (limited[~occupied] == EMPTY).all()
