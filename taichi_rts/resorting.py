@@ -7,7 +7,7 @@ import taichi as ti
 
 from taichi_rts.backend import CHUNK, threads
 
-FEW = 4
+FEW = 8
 """Only if fewer than one of so many particles have changed their cell there is a list of them; else all are sorted anew."""
 BITS = 32  # particles that are compared with their cells at a time
 
