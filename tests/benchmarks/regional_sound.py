@@ -67,7 +67,7 @@ def speed(names: list[str], particles: str, courants: list[float], steppers: str
 
     Beside the sound speed that the scene estimates that is 10 v_max, v_max being the largest speed that really occurred in the
     uniform run: its costs are those of the uniform run times the ratio of the sound speeds, which is what they are
-    proportional to. `regional-cap` is told as much: its cap is 10 v_max, not twenty times the estimate.
+    proportional to. `capped` is told as much: its cap is 10 v_max, not twenty times the estimate.
     """
     for name in names:
         scene = rts.load_scene(name, particles=particles)
@@ -93,7 +93,7 @@ def speed(names: list[str], particles: str, courants: list[float], steppers: str
                 ("uniform", scene, rts.Uniform(courant)),
                 ("uniform-c", regional, rts.Uniform(courant, adaptive=True)),
                 ("regional-c", regional, rts.Regional(courant=courant)),
-                ("regional-cap", None, rts.Regional(courant=courant)),
+                ("capped", None, rts.Regional(courant=courant)),
                 ("asynchronous-c", regional, rts.Asynchronous(courant=courant)),
             ):
                 if label not in steppers.split(","):
@@ -278,7 +278,7 @@ def main(
     particles: str | None = None,
     scenes: str = SCENES,
     courants: str | None = None,
-    steppers: str = "uniform,uniform-c,regional-c,regional-cap,asynchronous-c",
+    steppers: str = "uniform,uniform-c,regional-c,capped,asynchronous-c",
     arch: str = "cpu",
 ) -> None:
     """Run the parts."""
