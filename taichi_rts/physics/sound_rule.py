@@ -70,6 +70,10 @@ class SoundRule:
         self.acceleration2 = ti.field(float, self.blocks)
         self.viscosity = ti.field(float, self.blocks)
 
+    def look_at_all(self) -> None:
+        """Have the next `update` look at all blocks, whoever has stepped."""
+        self.wish.fill(0.0)
+
     def update(self, schedule: Any, now: int, tick: float) -> None:
         """Work out the targets and limits of all blocks at tick `now`.
 

@@ -132,7 +132,7 @@ class RegionalSchedule(Schedule):
         if self.aligned:
             self.last_level.fill(BlockLimiter.EMPTY)
             self.held.fill(0)
-        self.block_due.fill(1)  # nothing is known of any block
+        self.block_due.fill(0)
         self.take_counts()
 
     def begin(self, timeline: Timeline, target: int) -> bool:
