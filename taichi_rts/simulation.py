@@ -215,6 +215,8 @@ class Simulation:
             self.outlets.take_out(leaving, now, tick)
         if self._sorts % REORDER_EVERY == 0:
             self.particles.reorder(self.grid.order)
+            if self.grid.tracks_arrivals:
+                self.grid.arrived.fill(1)  # so that all blocks are looked at now and then
         self._sorts += 1
         self._update_grid(now, tick)
         self.schedule.sorted(now, tick)

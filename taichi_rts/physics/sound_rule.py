@@ -77,8 +77,10 @@ class SoundRule:
     def update(self, schedule: Any, now: int, tick: float) -> None:
         """Work out the targets and limits of all blocks at tick `now`.
 
-        What is said of neighbours' targets takes a block a call to spread, which no wave overtakes. Only blocks in which
-        somebody was due in the last step of `schedule`, or that somebody has come into since, are looked at again.
+        What is said of neighbours' targets takes a block a call to spread, which no wave overtakes. Only blocks that
+        somebody read in the last step of `schedule`, or that somebody has come into since, are looked at again, and all of them
+        now and then. With less (who has stepped alone,
+        and never all) a ringing pool of 1 m has four to ten times the energy after 20 s.
         """
         self.work_out(schedule, now, tick)
 
@@ -94,7 +96,7 @@ class SoundRule:
             self.forget(self.grid.vacated[m])
         for m in range(self.grid.occupied_count[None]):
             block = self.grid.occupied[m]
-            if self.is_stale(block, schedule.has_stepped(block)):
+            if self.is_stale(block, schedule.read_at[block] >= 0):
                 self.look_at(block, now, tick)
             self.felt[block] = ti.max(self.wish[block], 0.5 * self.target[block])
         self.around.visit(self, False, ti.Vector([0.0, 0.0]))
@@ -121,9 +123,9 @@ class SoundRule:
                 self.finish(block, around)
 
     @ti.func
-    def is_stale(self, block, stepped):
+    def is_stale(self, block, was_read):
         """Whether what is known of an occupied block may have changed since it was looked at."""
-        stale = stepped or self.wish[block] == 0.0
+        stale = was_read or self.wish[block] == 0.0
         if ti.static(self.grid.tracks_arrivals):
             stale = stale or self.grid.arrived[block] == 1
         return stale
