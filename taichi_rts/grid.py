@@ -228,7 +228,8 @@ class BlockGrid:
     def track_arrivals(self) -> None:
         """From now on note in `arrived`, (blocks,), by a 1 which blocks a particle has come into; who reads it changes it.
 
-        Has to be called before the first `update`.
+        Now and then, after particles were reordered in memory, `Simulation` has all blocks count. Has to be called before the
+        first `update`.
         """
         self.tracks_arrivals = True
         self.arrived = ti.field(ti.i32, self.geometry.blocks)

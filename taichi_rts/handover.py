@@ -84,8 +84,6 @@ class Snapshot:
         sim.grid.order.from_numpy(np.arange(sim.particles.capacity, dtype=np.int32))
         sim.grid.forget()
         sim.schedule.read_at.fill(0)
-        if sim.sound:
-            sim.sound.look_at_all()
         for counter in (
             sim.motion.stopped,
             sim.motion.stopped_by_obstacles,

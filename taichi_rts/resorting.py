@@ -73,9 +73,8 @@ class Resorting:
         """
         for turn in range((self.grid.alive[None] + (BITS - 1)) // BITS):
             first, changed = turn * BITS, 0
-            for i in range(
-                first, ti.min(first + BITS, self.grid.alive[None])
-            ):  # nothing is stored, so LLVM takes 8 at a time
+            # Nothing is stored here, so LLVM takes 8 at a time.
+            for i in range(first, ti.min(first + BITS, self.grid.alive[None])):
                 differs = self.grid.geometry.cell(locate(i, now, tick)) != self.grid.cell_of[i]
                 changed |= ti.cast(differs, ti.i32) << (i - first)
             i = first
@@ -224,9 +223,8 @@ class Resorting:
                     changed = ti.bit_shr(changed, 1)
         self.move(done, last, n - done)
         last_block = grid.block_of(end - 1)
-        occupied = ti.cast(
-            n + last - done > grid.first(last_block), ti.i32
-        )  # where the next begins is another thread's
+        # Where the next block begins is another thread's to write, so the last is asked otherwise.
+        occupied = ti.cast(n + last - done > grid.first(last_block), ti.i32)
         for block in range(grid.block_of(first), last_block):
             occupied += ti.cast(not grid.is_empty(block), ti.i32)
         self.occupied_in[part] = occupied

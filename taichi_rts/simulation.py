@@ -196,7 +196,7 @@ class Simulation:
             if schedule.needs_sorting:
                 self._sort(now, tick)  # line 4
             if self.sound and schedule.needs_sound:
-                self.sound.update(schedule, now, tick)
+                self.sound.update(schedule.read_at, now, tick)
             schedule.select(now, tick)  # lines 5-16
             self.motion.predict_neighbourhood(schedule.read_at, now, tick)  # lines 25-26, where somebody looks
         with self.overhead.due:

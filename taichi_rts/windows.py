@@ -20,9 +20,8 @@ from taichi_rts.physics.walls import make_wall_sum
 
 TASKS = 64  # shares of the due particles that threads take one by one
 RUN = 16  # most blocks that share a window
-VECTOR = (
-    32  # loops go on to a multiple of it, or LLVM leaves a scalar remainder; who lies there is too far away to count
-)
+VECTOR = 32
+"""Loops go on to a multiple of it, or LLVM leaves a scalar remainder; who lies there is too far away to count."""
 ROOM = 1.5  # of a window, over what lies around a run of blocks at rest
 FAR = 1e3  # distance over the support radius of those behind the last
 

@@ -20,6 +20,7 @@ import taichi_rts as rts
 from taichi_rts.benchmarks import peers, timing
 from taichi_rts.benchmarks.memory import memory_of
 from taichi_rts.benchmarks.scenes import FRONT_TIME, peers_dam_break
+from taichi_rts.stepping.regional import LARGEST_COURANT
 
 SETTLED = 0.05  # [s]: the column has left its lattice
 
@@ -108,7 +109,7 @@ def simulated_second(settings: Settings) -> Iterator[Row]:
         for name, sound_speed in (("one sound speed", scene.sound_speed), ("regional sound speed", "regional")):
             settings.start()
             # The default's longest step with the regional sound speed as well, whose own default is shorter.
-            stepper = rts.Regional(courant=0.6) if sound_speed == "regional" else rts.Regional()
+            stepper = rts.Regional(courant=LARGEST_COURANT) if sound_speed == "regional" else rts.Regional()
             sim = rts.Simulation(scene.replace(sound_speed=sound_speed), stepper)
             sim.advance_to(FRONT_TIME)
             size = millions(sim.count)
@@ -174,7 +175,7 @@ def sparse_steps(settings: Settings) -> Iterator[Row]:
     """What a step costs in which few are due."""
     settings.start()
     scene = rts.load_scene("projectile", particles=str(settings.particles(100_000))).replace(sound_speed="regional")
-    sim = rts.Simulation(scene, rts.Regional(courant=0.6))
+    sim = rts.Simulation(scene, rts.Regional(courant=LARGEST_COURANT))
     sim.advance_to(0.4 * scene.end_time)
     due, wall = timing.timed_steps(sim, 600)
     share = timing.share_of_full_step(due, wall, sim.count, 0.1)

@@ -70,19 +70,15 @@ class SoundRule:
         self.acceleration2 = ti.field(float, self.blocks)
         self.viscosity = ti.field(float, self.blocks)
 
-    def look_at_all(self) -> None:
-        """Have the next `update` look at all blocks, whoever has stepped."""
-        self.wish.fill(0.0)
-
-    def update(self, schedule: Any, now: int, tick: float) -> None:
+    def update(self, read_at: ti.Field, now: int, tick: float) -> None:
         """Work out the targets and limits of all blocks at tick `now`.
 
-        What is said of neighbours' targets takes a block a call to spread, which no wave overtakes. Only blocks that
-        somebody read in the last step of `schedule`, or that somebody has come into since, are looked at again, and all of them
-        now and then. With less (who has stepped alone,
-        and never all) a ringing pool of 1 m has four to ten times the energy after 20 s.
+        What is said of neighbours' targets takes a block a call to spread, which no wave overtakes. Only blocks that somebody
+        read in the last step (`read_at` of it is not negative), or that somebody has come into since, are looked at again, and
+        all of them now and then: in the others nobody has stepped. With less (only who has stepped, and never all) a ringing
+        pool of 1 m has four to ten times the energy after 20 s.
         """
-        self.work_out(schedule, now, tick)
+        self.work_out(read_at, now, tick)
 
     def update_some(self, cells: Any, tick: float) -> None:
         """Do the same for the cells that have just stepped (`stepping.cells.Cells`), each at its own time, and those beside."""
@@ -90,13 +86,13 @@ class SoundRule:
 
     @ti.kernel
     def work_out(
-        self, schedule: ti.template(), now: ti.i32, tick: float
+        self, read_at: ti.template(), now: ti.i32, tick: float
     ):  # one kernel, for launches cost more than the last loops
         for m in range(self.grid.vacated_count[None]):
             self.forget(self.grid.vacated[m])
         for m in range(self.grid.occupied_count[None]):
             block = self.grid.occupied[m]
-            if self.is_stale(block, schedule.read_at[block] >= 0):
+            if self.is_stale(block, read_at[block]):
                 self.look_at(block, now, tick)
             self.felt[block] = ti.max(self.wish[block], 0.5 * self.target[block])
         self.around.visit(self, False, ti.Vector([0.0, 0.0]))
@@ -123,9 +119,9 @@ class SoundRule:
                 self.finish(block, around)
 
     @ti.func
-    def is_stale(self, block, was_read):
+    def is_stale(self, block, read_at):
         """Whether what is known of an occupied block may have changed since it was looked at."""
-        stale = was_read or self.wish[block] == 0.0
+        stale = read_at >= 0 or self.wish[block] == 0.0
         if ti.static(self.grid.tracks_arrivals):
             stale = stale or self.grid.arrived[block] == 1
         return stale

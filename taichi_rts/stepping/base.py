@@ -88,11 +88,6 @@ class Schedule:
         block = self.grid.occupied[m]
         return self.due_start[block], self.due_start[block] + self.block_due[block]
 
-    @ti.func
-    def has_stepped(self, block):
-        """Whether somebody in an occupied `block` may have been due in the last step."""
-        return self.read_at[block] >= 0
-
     def begin(self, timeline: Timeline, target: int) -> bool:
         """Set the clock to the next step and return True, unless that step ends after tick `target`.
 

@@ -73,18 +73,14 @@ class RegionalSchedule(Schedule):
         if self.by_sound:  # whose sound speeds are graded already; forces are not, but reach no further
             ratio_sweeps = min(1, ratio_sweeps)
         grading_sweeps = max(0, self.levels - 2) if stepper.grading else 0
-        rules = [(reach, 0)] + ratio_sweeps * [(NeighbourLimiter.RATIO, 0)] + grading_sweeps * [(1, 1)]
-        if self.levels == 1:
-            rules = []
-        targets = [(self.block_level, self.raw_level)[n % 2] for n in range(len(rules))][
-            ::-1
-        ]  # the last is `block_level`
-        self.own_level = self.raw_level if len(rules) % 2 else self.block_level
+        ratio, grading = ratio_sweeps * [(NeighbourLimiter.RATIO, 0)], grading_sweeps * [(1, 1)]
+        rules = [(reach, 0), *ratio, *grading] if self.levels > 1 else []
+        to_and_fro = (self.block_level, self.raw_level)  # the last sweep writes `block_level`
+        self.own_level = to_and_fro[len(rules) % 2]
         """What each block allows itself, where the first sweep reads it."""
-        sources = [self.own_level, *targets[:-1]]
         self.sweeps = [
-            Sweep(self.beside, source, target, *rule)
-            for source, target, rule in zip(sources, targets, rules, strict=False)
+            Sweep(self.beside, to_and_fro[left % 2], to_and_fro[(left - 1) % 2], *rule)
+            for left, rule in zip(range(len(rules), 0, -1), rules, strict=True)
         ]
         self.around = Surroundings(grid)
         self.raw_level.fill(BlockLimiter.EMPTY)
@@ -132,7 +128,6 @@ class RegionalSchedule(Schedule):
         if self.aligned:
             self.last_level.fill(BlockLimiter.EMPTY)
             self.held.fill(0)
-        self.block_due.fill(0)
         self.take_counts()
 
     def begin(self, timeline: Timeline, target: int) -> bool:

@@ -189,7 +189,7 @@ def test_a_fast_block_stiffens_those_around_it_and_by_halves_those_beyond(strip)
     assert np.count_nonzero(places == 4) == 8
     seen = []
     for _ in range(6):
-        sim.sound.update(sim.schedule, 0, sim.timeline.tick)
+        sim.sound.update(sim.schedule.read_at, 0, sim.timeline.tick)
         low, high = along(sim, blocks, places, sim.sound.target)
         assert low == pytest.approx(high)
         seen.append(low)
@@ -210,7 +210,7 @@ def test_a_fast_block_stiffens_those_around_it_and_by_halves_those_beyond(strip)
 def test_cap_and_floor_hold(strip, speed, wish):
     sim, blocks, places = strip
     sim.particles.v.from_numpy(np.where(places == 4, speed, 0.0)[:, None] * np.array([1.0, 0.0]))
-    sim.sound.update(sim.schedule, 0, sim.timeline.tick)
+    sim.sound.update(sim.schedule.read_at, 0, sim.timeline.tick)
     target = along(sim, blocks, places, sim.sound.target)[1]
     assert target[3:6] == pytest.approx(wish)
     assert target.min() == pytest.approx(FLOOR)
@@ -225,7 +225,7 @@ def test_speeds_are_those_of_the_present(strip):
     now = round(0.1 / tick)
     updated = sim.particles.updated.to_numpy()
     assert not updated.any()
-    sim.sound.update(sim.schedule, now, tick)
+    sim.sound.update(sim.schedule.read_at, now, tick)
     assert along(sim, blocks, places, sim.sound.target)[1][4] == pytest.approx(300 * now * tick)
 
 
@@ -238,7 +238,7 @@ def test_a_block_under_pressure_needs_sound_though_it_is_still(strip):
     rho = np.full(sim.count, REST)
     rho[half] = 1050.0
     p.rho.from_numpy(rho)
-    sim.sound.update(sim.schedule, 0, sim.timeline.tick)
+    sim.sound.update(sim.schedule.read_at, 0, sim.timeline.tick)
     mean = 0.5 * pressure(1050.0, 20.0, REST)
     expected = math.sqrt(mean / REST) / 0.1
     assert 2 * FLOOR < expected < CAP
@@ -249,7 +249,7 @@ def test_a_block_under_pressure_needs_sound_though_it_is_still(strip):
     assert sim.sound.limit.to_numpy()[block] == pytest.approx(max(expected, 20.0 * (1.05**3 - 0.1)))
     rho[half] = 900.0  # pulls nobody, and so asks for nothing
     p.rho.from_numpy(rho)
-    sim.sound.update(sim.schedule, 0, sim.timeline.tick)
+    sim.sound.update(sim.schedule.read_at, 0, sim.timeline.tick)
     assert sim.sound.wish.to_numpy()[block] == pytest.approx(FLOOR)
 
 
