@@ -23,6 +23,13 @@ RUN = 16  # most blocks that share a window
 VECTOR = 32
 """Loops go on to a multiple of it, or LLVM leaves a scalar remainder; who lies there is too far away to count."""
 ROOM = 1.5  # of a window, over what lies around a run of blocks at rest
+AT_ONCE = {2: 1, 3: 8}
+"""Fluid entries that are copied as one vector, by dimension: mostly all of a cell's, so that no branch is mispredicted.
+
+In two dimensions, and on walls, cells hold so few that it gains nothing and takes longer to compile.
+"""
+INDEX = 0x0FFFFFFF
+"""Masks an index, by which LLVM sees that adding a few does not overflow; else it would not find out that they are one vector."""
 FAR = 1e3  # distance over the support radius of those behind the last
 
 
@@ -45,13 +52,17 @@ class Windows:
 
     transient = frozenset({"start", "column_start", "own_start"})
 
-    def __init__(self, geometry: Geometry, start: ti.Field, capacity: int) -> None:
+    def __init__(self, geometry: Geometry, start: ti.Field, capacity: int, at_once: int) -> None:
         self.geometry = geometry
         self.start = start
         self.rows = 3 ** (geometry.dim - 1)
         self.row_count = ti.field(ti.i32, ())
         """`rows` as a loop bound LLVM does not know: it would unroll the loop, which takes three times as long to compile."""
         self.row_count[None] = self.rows
+        self.at_once = at_once
+        self.stride = ti.field(ti.i32, ())
+        """`at_once` as a step that LLVM does not know, for the same reason."""
+        self.stride[None] = at_once
         self.capacity = capacity
         self.size = capacity + VECTOR
         self.entries = entries(capacity)
@@ -110,17 +121,28 @@ class Windows:
                     self.own_start[number + part] = n
                 cell = self.cell(row, column, above) + part
                 first, last = self.start[cell], self.start[cell + 1]
-                for k in range(first, last):
-                    for field, copy, _nobody, axis in ti.static(copies):
-                        if ti.static(axis >= 0 and self.geometry.periodic[axis]):
-                            middle = self.middle(row, column, above, axis)
-                            length = ti.static(self.geometry.lengths[axis])
-                            beside = field[k] - middle  # the image that lies where the window does
-                            copy[n + k - first] = middle + beside - length * ti.floor(beside / length + 0.5)
-                        else:
-                            copy[n + k - first] = field[k]
+                k = first
+                while True:  # seldom more than once; what is copied beyond `last` the next cell overwrites
+                    self.copy(copies, k & INDEX, (n + k - first) & INDEX, row, column, above)
+                    k += self.stride[None]
+                    if k >= last:
+                        break
                 n += last - first
         return n
+
+    @ti.func
+    def copy(self, copies: ti.template(), k, n, row, column, above):
+        """Copy `at_once` entries from `k` on, which lie in the block at `column` in row `above` of those around `row`, to `n`."""
+        for field, copy, _nobody, axis in ti.static(copies):
+            values = ti.Vector([field[k + lane] for lane in ti.static(range(self.at_once))])
+            if ti.static(axis >= 0 and self.geometry.periodic[axis]):
+                middle = self.middle(row, column, above, axis)
+                length = ti.static(self.geometry.lengths[axis])
+                for lane in ti.static(range(self.at_once)):
+                    beside = values[lane] - middle  # the image that lies where the window does
+                    values[lane] = middle + beside - length * ti.floor(beside / length + 0.5)
+            for lane in ti.static(range(self.at_once)):
+                copy[n + lane] = values[lane]
 
     @ti.func
     def middle(self, row, column, above, axis: ti.template()):
@@ -154,7 +176,7 @@ class FluidWindows(Windows):
 
     def __init__(self, near: Neighbourhood, grid: BlockGrid, per_block: float, backend: Backend, needs: Any) -> None:
         dim = grid.geometry.dim
-        super().__init__(grid.geometry, grid.start, room(dim, per_block))
+        super().__init__(grid.geometry, grid.start, room(dim, per_block), AT_ONCE[dim])
         self.inside = Neighbourhood(self.entries, dim, backend, needs)
         """Its positions are unrolled along periodic axes."""
 
@@ -169,7 +191,7 @@ class WallWindows(Windows):
         counts = np.diff(wall.start.to_numpy()[::CELLS_PER_BLOCK]).reshape(geometry.shape[::-1])
         for axis in range(geometry.dim - 1):
             counts = counts + np.roll(counts, 1, axis) + np.roll(counts, -1, axis)
-        super().__init__(geometry, wall.start, int(counts.max()) * (RUN + 2))
+        super().__init__(geometry, wall.start, int(counts.max()) * (RUN + 2), 1)
         self.inside = wall.room_for(self.entries)
 
 
