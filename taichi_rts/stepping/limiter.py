@@ -7,17 +7,12 @@ from taichi_rts.grid import Geometry
 
 @ti.data_oriented
 class BlockLimiter:
-    """Lowers the step of a block, in base steps, to `factor` times its shortest neighbour's plus `jump`.
-
-    `factor = 1, jump = 0` is the paper's R_min: the outer layer of the slower side takes the faster side's step. `jump = 1` is
-    one sweep of grading. Neighbours are the 8 (26) blocks around; empty ones (`EMPTY`) limit nobody.
-    """
+    """What blocks allow each other. Neighbours are the 8 (26) blocks around; empty ones (`EMPTY`) limit nobody."""
 
     EMPTY = 1 << 30
 
     def __init__(self, geometry: Geometry) -> None:
         self.geometry = geometry
-        self.blocks = geometry.blocks
 
     @ti.func
     def shortest_beside(self, steps, block):
@@ -29,22 +24,17 @@ class BlockLimiter:
 
     @ti.func
     def limited(self, step, shortest, factor, jump):
-        """Return `step` or what the shortest neighbour allows; `EMPTY` limits nobody."""
-        return step if shortest == self.EMPTY else ti.min(step, factor * shortest + jump)
+        """Lower `step` to `factor` times the `shortest` of the neighbours plus `jump`.
 
-    @ti.kernel
-    def limit(self, source: ti.template(), target: ti.template(), factor: ti.i32, jump: ti.i32):
-        """Write the limited steps of `source` to `target`, (blocks,) both."""
-        for block in range(self.blocks):
-            step = source[block]
-            if step != self.EMPTY:
-                step = self.limited(step, self.shortest_beside(source, block), factor, jump)
-            target[block] = step
+        `factor = 1, jump = 0` is the paper's R_min: the outer layer of the slower side takes the faster side's step. `jump = 1`
+        is one sweep of grading.
+        """
+        return step if shortest == self.EMPTY else ti.min(step, factor * shortest + jump)
 
 
 @ti.data_oriented
 class Sweep:
-    """One pass of `BlockLimiter.limit` over the occupied blocks, for `Surroundings.visit`."""
+    """Writes the limited steps of `source` to `target`, (blocks,) [base steps], for `Surroundings.visit`."""
 
     def __init__(self, limiter: BlockLimiter, source: ti.Field, target: ti.Field, factor: int, jump: int) -> None:
         self.limiter = limiter

@@ -6,8 +6,9 @@ import taichi_rts as rts
 from taichi_rts import backend
 from taichi_rts.grid import BlockGrid, Geometry
 from taichi_rts.particles import Particles
-from taichi_rts.stepping.limiter import BlockLimiter, NeighbourLimiter
+from taichi_rts.stepping.limiter import BlockLimiter, NeighbourLimiter, Sweep
 from taichi_rts.stepping.regions import RegionalSchedule
+from taichi_rts.surroundings import Surroundings
 
 EMPTY = BlockLimiter.EMPTY
 
@@ -34,18 +35,33 @@ def lowest_neighbour(geometry, levels):
     return lowest.ravel(order="F")
 
 
+def occupy(grid, blocks):
+    """Let somebody be in `blocks` of `grid`, and nobody elsewhere."""
+    grid.occupied.from_numpy(np.pad(blocks, (0, grid.geometry.blocks - len(blocks))).astype(np.int32))
+    grid.occupied_count[None] = len(blocks)
+
+
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("jump", [0, 1])
 def test_no_block_keeps_more_than_its_neighbours_raw_level_plus_jump(taichi_cpu, dim, jump):
     geometry = Geometry((0,) * dim, (1.1,) * dim, 0.1)
     source, target = ti.field(ti.i32, geometry.blocks), ti.field(ti.i32, geometry.blocks)
-    limiter = BlockLimiter(geometry)
+    grid = BlockGrid(geometry, 1)
+    around = Surroundings(grid)
+    sweep = Sweep(BlockLimiter(geometry), source, target, 1, jump)
+
+    @ti.kernel
+    def limit():
+        around.visit(sweep, True, EMPTY)
+
     for seed in range(3):
         raw = random_levels(geometry, seed=seed)
-        source.from_numpy(raw)
-        limiter.limit(source, target, 1, jump)
-        limited = target.to_numpy()
         occupied = raw != EMPTY
+        occupy(grid, np.nonzero(occupied)[0])
+        source.from_numpy(raw)
+        target.fill(EMPTY)
+        limit()
+        limited = target.to_numpy()
         expected = np.minimum(raw, lowest_neighbour(geometry, raw) + jump)
         assert (limited == np.where(occupied, expected, EMPTY)).all()
         assert source.to_numpy().tolist() == raw.tolist()
@@ -53,9 +69,7 @@ def test_no_block_keeps_more_than_its_neighbours_raw_level_plus_jump(taichi_cpu,
 
 def apply_minimum_region(schedule, occupied):
     """Run the sweeps of `schedule` over the blocks `occupied`."""
-    grid = schedule.grid
-    grid.occupied.from_numpy(np.pad(occupied, (0, grid.geometry.blocks - len(occupied))).astype(np.int32))
-    grid.occupied_count[None] = len(occupied)
+    occupy(schedule.grid, occupied)
 
     @ti.kernel
     def run():
