@@ -255,14 +255,12 @@ class BlockGrid:
         if self.serial:
             self.resorting.restored()
 
-    def update(self, locate: Callable[..., Any], identity: ti.Field, *time: Any) -> None:
-        """Sort anew. `locate(*time)` is a kernel that calls `insert` once for every particle, or `insert_all`."""
-        locate(*time)
-        self.place_particles(identity)
-
     @ti.func
     def insert_all(self, locate: ti.template(), now, tick):
-        """`insert` every particle `i` at `locate(i, now, tick)` [m]; to be called at the outermost level of a kernel."""
+        """`insert` every particle `i` at `locate(i, now, tick)` [m]; to be called at the outermost level of a kernel.
+
+        That, or an `insert` of every particle, and then `place`, sorts anew.
+        """
         if ti.static(self.serial):
             self.resorting.insert_all(locate, now, tick)
         else:
@@ -289,10 +287,9 @@ class BlockGrid:
         if ti.static(self.serial):
             self.resorting.insert(i, before, cell)
 
-    @ti.kernel
-    def place_particles(
-        self, identity: ti.template()
-    ):  # many loops in one kernel: a launch costs more than some of them
+    @ti.func
+    def place(self, identity: ti.template()):
+        """Sort all that have been inserted, in a cell in the order of `identity`, at the outermost level of a kernel."""
         if ti.static(self.serial):
             self.resorting.sort(identity)
             if ti.static(self.tracks_vacated):

@@ -112,25 +112,25 @@ class Resorting:
         ti.loop_config(serialize=True)
         for _ in range(1):
             self.list_arrivals()
-        for part in range(self.parts):
-            first, end = self.cells_of(part)
-            self.old_first[part] = self.grid.start[first]
-            self.new_first[part] = self.grid.start[end] - self.grid.start[first] + self.growth[part]
-            self.growth[part] = 0
-        ti.loop_config(serialize=True)
-        for _ in range(1):
-            self.old_first[self.parts] = self.grid.start[self.grid.geometry.cells]
-            total = 0
-            for part in range(self.parts):
-                count = self.new_first[part]
-                self.new_first[part] = total
-                total += count
-            self.new_first[self.parts] = self.grid.start[self.grid.geometry.cells] = total
+            self.find_parts()
         for part in range(self.parts):
             if self.touched[part] == 1:
                 self.merge(part, identity)
             else:
                 self.shift(part)
+
+    @ti.func
+    def find_parts(self):
+        """Find where the particles of each part begin, before and after."""
+        before, after = 0, 0
+        for part in range(self.parts):
+            _first, end = self.cells_of(part)
+            self.old_first[part], self.new_first[part] = before, after
+            after += self.grid.start[end] - before + self.growth[part]
+            before = self.grid.start[end]
+            self.growth[part] = 0
+        self.old_first[self.parts], self.new_first[self.parts] = before, after
+        self.grid.start[self.grid.geometry.cells] = after
 
     @ti.func
     def list_arrivals(self):

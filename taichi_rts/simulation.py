@@ -222,7 +222,7 @@ class Simulation:
         self.schedule.sorted(now, tick)
 
     def _update_grid(self, now: int, tick: float) -> None:
-        self.grid.update(self.motion.locate_particles, self.particles.identity, now, tick)
+        self.motion.sort_particles(now, tick)
 
     def advance_to(self, time: float) -> None:
         """Run all steps up to physical `time` [s]; readers then predict to exactly that time.

@@ -1,5 +1,7 @@
 """Limits between neighbouring blocks: how much longer than its neighbours' a block's step may be, and how it may grow."""
 
+from typing import Any
+
 import taichi as ti
 
 from taichi_rts.grid import Geometry
@@ -34,12 +36,18 @@ class BlockLimiter:
 
 @ti.data_oriented
 class Sweep:
-    """Writes the limited steps of `source` to `target`, (blocks,) [base steps], for `Surroundings.visit`."""
+    """Writes the limited steps of `source` to `target`, (blocks,) [base steps], for `Surroundings.visit`.
 
-    def __init__(self, limiter: BlockLimiter, source: ti.Field, target: ti.Field, factor: int, jump: int) -> None:
+    `then(block, now, passed)`, a ti.func, is called for each block that is done.
+    """
+
+    def __init__(
+        self, limiter: BlockLimiter, source: ti.Field, target: ti.Field, factor: int, jump: int, then: Any = None
+    ) -> None:
         self.limiter = limiter
         self.source, self.target = source, target
         self.factor, self.jump = factor, jump
+        self.then, self.goes_on = then, then is not None
 
     @ti.func
     def read(self, block):
@@ -47,9 +55,11 @@ class Sweep:
         return self.source[block]
 
     @ti.func
-    def finish(self, block, shortest):
+    def finish(self, block, shortest, now, passed):
         """Limit the step of `block` beside others, the shortest of which is given."""
         self.target[block] = self.limiter.limited(self.source[block], shortest, self.factor, self.jump)
+        if ti.static(self.goes_on):
+            self.then(block, now, passed)
 
 
 @ti.data_oriented

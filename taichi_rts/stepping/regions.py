@@ -39,7 +39,7 @@ class RegionalSchedule(Schedule):
     `block_level` is the region of each block (`BlockLimiter.EMPTY` where there is no particle).
     """
 
-    transient = frozenset({"scan", "occupancy", "updates", "rows"})
+    transient = frozenset({"scan", "occupancy", "updates", "rows", "ends"})
 
     def __init__(self, stepper: "Regional", scene: Scene, particles: Particles, grid: BlockGrid) -> None:
         super().__init__(particles, grid)
@@ -66,7 +66,8 @@ class RegionalSchedule(Schedule):
         self.aligned = self.by_sound or stepper.resolved("steps") != "integers"
         self.levels_double = self.aligned
         self.limiter = NeighbourLimiter(doubling=False)
-        self.until_next = ti.field(ti.i32, ())
+        self.until_next, self.ends = ti.field(ti.i32, ()), ti.field(ti.i32, ())
+        """Ticks to the end of the first step that ends; bit n - 1: whether aligned steps of n ticks end now."""
         self.now = 0
         reach = NeighbourLimiter.RATIO if self.by_sound else 1  # the sound speed has spread by a block already
         ratio_sweeps = max(0, math.ceil(math.log2(self.levels)) - 1) if self.limits else 0
@@ -79,7 +80,9 @@ class RegionalSchedule(Schedule):
         self.own_level = to_and_fro[len(rules) % 2]
         """What each block allows itself, where the first sweep reads it."""
         self.sweeps = [
-            Sweep(self.beside, to_and_fro[left % 2], to_and_fro[(left - 1) % 2], *rule)
+            Sweep(
+                self.beside, to_and_fro[left % 2], to_and_fro[(left - 1) % 2], *rule, self.settle if left == 1 else None
+            )
             for left, rule in zip(range(len(rules), 0, -1), rules, strict=True)
         ]
         self.around = Surroundings(grid)
@@ -150,18 +153,15 @@ class RegionalSchedule(Schedule):
     def decide(self, now: ti.i32, passed: ti.i32, tick: float, reach: float):
         """All of it; `passed` ticks have gone by since the last call. One kernel, for launches cost more than its loops."""
         self.forget_vacated()
-        self.determine_regions(now, tick, reach)
-        self.apply_minimum_region()
-        if ti.static(self.aligned):
-            self.update_aligned_validity(now, passed)
-        else:
-            self.update_validity(now, passed)
+        self.determine_regions(now, passed, tick, reach)
+        self.apply_minimum_region(now, passed)
         self.find_due_starts(now)
         self.list_due()
 
     @ti.func
     def forget_vacated(self):
         """Blocks that hold nobody any more have no region, nobody due, and are not read."""
+        ti.loop_config(serialize=self.grid.serial)  # they are few
         for m in range(self.grid.vacated_count[None]):
             block = self.grid.vacated[m]
             if ti.static(self.aligned):
@@ -174,8 +174,9 @@ class RegionalSchedule(Schedule):
             self.read_at[block] = -1
 
     @ti.func
-    def determine_regions(self, now, tick, reach):
+    def determine_regions(self, now, passed, tick, reach):
         """Lines 6-9: maxima of |v| and F/m over each block, and the largest n that Eq. 2 and 3 allow."""
+        self.find_ends(now)
         for m in range(self.grid.occupied_count[None]):
             block = self.grid.occupied[m]
             level = 1
@@ -197,6 +198,17 @@ class RegionalSchedule(Schedule):
                     else:
                         level = self.limiter.settled(level, before, now)
             self.own_level[block] = level
+            if ti.static(len(self.sweeps) == 0):
+                self.settle(block, now, passed)
+
+    @ti.func
+    def find_ends(self, now):
+        """Find which aligned steps end now."""
+        self.until_next[None] = self.levels
+        ends = 0
+        for n in ti.static(self.lengths):
+            ends |= ti.cast(now % n == 0, ti.i32) << (n - 1)
+        self.ends[None] = ends
 
     @ti.func
     def has_stepped(self, block):
@@ -254,33 +266,42 @@ class RegionalSchedule(Schedule):
         return level
 
     @ti.func
-    def apply_minimum_region(self):
-        """R_min of Section 3, then the sweeps of the limiter and of grading, which spread by a block each."""
+    def apply_minimum_region(self, now, passed):
+        """R_min of Section 3, then the sweeps of the limiter and of grading, which spread by a block each.
+
+        The last goes on with lines 10-16 for each block that it is done with.
+        """
         for sweep in ti.static(self.sweeps):
-            self.around.visit(sweep, True, BlockLimiter.EMPTY)
+            self.around.visit(sweep, True, BlockLimiter.EMPTY, now, passed)
 
     @ti.func
-    def update_validity(self, now, passed):
-        """Lines 10-16: find who is due, because its validity has run out or its block has another step.
+    def settle(self, block, now, passed):
+        """Lines 10-16 for the particles of `block`, whose level is found."""
+        if ti.static(self.aligned):
+            self.update_aligned_validity(block, now, passed)
+        else:
+            self.update_validity(block, now, passed)
+
+    @ti.func
+    def update_validity(self, block, now, passed):
+        """Lines 10-16: find who in `block` is due, because its validity has run out or its block has another step.
 
         All take the step of their block.
         """
-        for m in range(self.grid.occupied_count[None]):
-            block = self.grid.occupied[m]
-            first, end = self.grid.first(block), self.grid.first(block + 1)
-            level = self.block_level[block]
-            count = 0
-            for k in range(first, end):
-                i = self.grid.order[k]
-                own = self.particles.level[i]
-                flag = ti.cast(own - (now - self.particles.updated[i]) <= 0 or own != level, ti.i32)
-                if own != level:
-                    self.particles.level[i] = level
-                self.flag[k] = flag
-                count += flag
-            self.block_due[block] = count
-            self.add(self.occupancy, level, (end - first) * passed)
-            self.add(self.updates, level, count)
+        first, end = self.grid.first(block), self.grid.first(block + 1)
+        level = self.block_level[block]
+        count = 0
+        for k in range(first, end):
+            i = self.grid.order[k]
+            own = self.particles.level[i]
+            flag = ti.cast(own - (now - self.particles.updated[i]) <= 0 or own != level, ti.i32)
+            if own != level:
+                self.particles.level[i] = level
+            self.flag[k] = flag
+            count += flag
+        self.block_due[block] = count
+        self.add(self.occupancy, level, (end - first) * passed)
+        self.add(self.updates, level, count)
 
     @ti.func
     def add(self, counts: ti.template(), level, count):
@@ -292,42 +313,36 @@ class RegionalSchedule(Schedule):
             counts[0, level] += count
 
     @ti.func
-    def update_aligned_validity(self, now, passed):
+    def update_aligned_validity(self, block, now, passed):
         """The same where steps end at multiples of themselves: a block is due as a whole, or nobody in it.
 
         It is due at a multiple of its step, when that has become shorter, or when somebody comes into it with a longer one.
         Who comes with a shorter one steps with the block. Particles of other blocks need not be looked at.
         """
-        self.until_next[None] = self.levels
-        ends = 0  # bit n - 1: whether steps of n base steps end now
-        for n in ti.static(self.lengths):
-            ends |= ti.cast(now % n == 0, ti.i32) << (n - 1)
-        for m in range(self.grid.occupied_count[None]):
-            block = self.grid.occupied[m]
-            first, end = self.grid.first(block), self.grid.first(block + 1)
-            level, before = self.block_level[block], self.last_level[block]
-            count = 0
-            if level != before and self.held[block] > 0:
-                self.add(self.occupancy, before, self.held[block])
-                self.held[block] = 0
-            due = (ends >> (level - 1)) & 1 == 1 or level < before
-            arrived = self.grid.arrived[block]
-            if arrived == 1:
-                self.grid.arrived[block] = 2  # until all have the block's level
+        first, end = self.grid.first(block), self.grid.first(block + 1)
+        level, before = self.block_level[block], self.last_level[block]
+        count = 0
+        if level != before and self.held[block] > 0:
+            self.add(self.occupancy, before, self.held[block])
+            self.held[block] = 0
+        due = (self.ends[None] >> (level - 1)) & 1 == 1 or level < before
+        arrived = self.grid.arrived[block]
+        if arrived == 1:
+            self.grid.arrived[block] = 2  # until all have the block's level
+            for k in range(first, end):
+                due = due or self.particles.level[self.grid.order[k]] > level
+        self.held[block] = self.held[block] + (end - first) * passed  # `+=` would be atomic
+        if due:
+            count = end - first
+            if level != before or arrived > 0:
+                self.grid.arrived[block] = 0
                 for k in range(first, end):
-                    due = due or self.particles.level[self.grid.order[k]] > level
-            self.held[block] = self.held[block] + (end - first) * passed  # `+=` would be atomic
-            if due:
-                count = end - first
-                if level != before or arrived > 0:
-                    self.grid.arrived[block] = 0
-                    for k in range(first, end):
-                        self.particles.level[self.grid.order[k]] = level
-                self.add(self.updates, level, count)
-            if ti.static(not self.grid.serial):
-                ti.atomic_min(self.until_next[None], level - now % level)
-            self.block_due[block] = count
-            self.last_level[block] = level
+                    self.particles.level[self.grid.order[k]] = level
+            self.add(self.updates, level, count)
+        if ti.static(not self.grid.serial):
+            ti.atomic_min(self.until_next[None], level - now % level)
+        self.block_due[block] = count
+        self.last_level[block] = level
 
     @ti.func
     def find_due_starts(self, now):
@@ -362,9 +377,9 @@ class RegionalSchedule(Schedule):
         """
         if ti.static(self.levels == 1):  # where all are due
             for m in range(self.grid.occupied_count[None]):
-                self.finish(self.grid.occupied[m], 0)
+                self.finish(self.grid.occupied[m], 0, 0, 0)
         else:
-            self.around.visit(self, False, 0)
+            self.around.visit(self, False, 0, 0, 0)
 
     @ti.func
     def read(self, block):
@@ -372,7 +387,7 @@ class RegionalSchedule(Schedule):
         return self.block_due[block]
 
     @ti.func
-    def finish(self, block, due_beside):
+    def finish(self, block, due_beside, now, passed):
         """List who is due in `block`, and have it read if somebody is there or, `due_beside`, beside it."""
         if self.block_due[block] > 0:
             n = self.due_start[block]

@@ -36,15 +36,16 @@ class SortedCloud:
 
     def sort(self, x):
         self.x.from_numpy(x)
-        self.grid.update(self.locate, self.identity)
+        self.place()
         order = self.grid.order.to_numpy()
         self.sorted.from_numpy(np.pad(x[order], ((0, CPU.lanes), (0, 0))))
         return order
 
     @ti.kernel
-    def locate(self):
+    def place(self):
         for i in range(self.count):
             self.grid.insert(i, self.x[i])
+        self.grid.place(self.identity)
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -52,7 +52,7 @@ class Sums:
         self.x.from_numpy(x)
         identity = ti.field(ti.i32, count)
         identity.from_numpy(np.arange(count, dtype=np.int32))
-        self.grid.update(self.locate, identity)
+        self.sort(identity)
         self.gather()
         self.windows = FluidWindows(self.near, self.grid, per_block, backend, frozenset())
         self.walls = [Walls(wall, self.near, self.geometry, backend)] if wall else []
@@ -88,9 +88,10 @@ class Sums:
         )
 
     @ti.kernel
-    def locate(self):
+    def sort(self, identity: ti.template()):
         for i in range(self.x.shape[0]):
             self.grid.insert(i, self.x[i])
+        self.grid.place(identity)
 
     @ti.kernel
     def gather(self):
