@@ -29,7 +29,10 @@ AT_ONCE = {2: 1, 3: 8}
 In two dimensions, and on walls, cells hold so few that it gains nothing and takes longer to compile.
 """
 INDEX = 0x0FFFFFFF
-"""Masks an index, by which LLVM sees that adding a few does not overflow; else it would not find out that they are one vector."""
+"""Masks an index, by which LLVM sees that adding a few does not overflow; else it would not find out that they are one vector.
+
+Where there are more entries than that they are copied one by one.
+"""
 FAR = 1e3  # distance over the support radius of those behind the last
 
 
@@ -123,12 +126,17 @@ class Windows:
                 first, last = self.start[cell], self.start[cell + 1]
                 k = first
                 while True:  # seldom more than once; what is copied beyond `last` the next cell overwrites
-                    self.copy(copies, k & INDEX, (n + k - first) & INDEX, row, column, above)
+                    self.copy(copies, self.bounded(k), self.bounded(n + k - first), row, column, above)
                     k += self.stride[None]
                     if k >= last:
                         break
                 n += last - first
         return n
+
+    @ti.func
+    def bounded(self, index):
+        """The same `index`, for LLVM to see that it is no more than `INDEX`."""
+        return index & INDEX if ti.static(self.at_once > 1) else index
 
     @ti.func
     def copy(self, copies: ti.template(), k, n, row, column, above):
@@ -176,7 +184,9 @@ class FluidWindows(Windows):
 
     def __init__(self, near: Neighbourhood, grid: BlockGrid, per_block: float, backend: Backend, needs: Any) -> None:
         dim = grid.geometry.dim
-        super().__init__(grid.geometry, grid.start, room(dim, per_block), AT_ONCE[dim])
+        capacity = room(dim, per_block)
+        few = max(near.x.shape[0], entries(capacity)) <= INDEX
+        super().__init__(grid.geometry, grid.start, capacity, AT_ONCE[dim] if few else 1)
         self.inside = Neighbourhood(self.entries, dim, backend, needs)
         """Its positions are unrolled along periodic axes."""
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import taichi as ti
 
+from taichi_rts import windows
 from taichi_rts.backend import Backend
 from taichi_rts.grid import CELLS_PER_BLOCK, BlockGrid, Geometry
 from taichi_rts.particles import Neighbourhood
@@ -178,6 +179,22 @@ def test_what_does_not_fit_into_a_window_is_summed_without(taichi_cpu_f64):
     crowd = np.random.default_rng(1).uniform(0.1, 0.3, (3000, 2))
     sums = Sums(np.concatenate([cloud(2, 100), crowd]), None, wall_beside(2), per_block=8)
     assert sums.windows.capacity < 3000
+    check(sums)
+
+
+def test_more_entries_than_a_masked_index_holds_are_copied_one_by_one(taichi_cpu_f64, monkeypatch):
+    x = cloud(3)
+    assert Sums(x, None).windows.at_once == 8
+    monkeypatch.setattr(windows, "INDEX", len(x))
+    sums = Sums(x, None)
+    assert sums.windows.at_once == 1
+    check(sums)
+
+
+def test_cells_that_hold_more_than_is_copied_at_once_are_summed_whole(taichi_cpu_f64):
+    crowd = np.random.default_rng(1).uniform(0.15, 0.4, (300, 3))
+    sums = Sums(np.concatenate([cloud(3, 100), crowd]), None, per_block=60)
+    assert np.diff(sums.grid.start.to_numpy()).max() > 2 * sums.windows.at_once
     check(sums)
 
 
