@@ -229,7 +229,7 @@ class BlockGrid:
         """From now on note in `arrived`, (blocks,), by a 1 which blocks a particle has come into; who reads it changes it.
 
         Now and then, after particles were reordered in memory, `Simulation` has all blocks count. Has to be called before the
-        first `update`.
+        first sort.
         """
         self.tracks_arrivals = True
         self.arrived = ti.field(ti.i32, self.geometry.blocks)
@@ -237,7 +237,7 @@ class BlockGrid:
     def track_vacated(self) -> None:
         """From now on list in `vacated` the `vacated_count[None]` blocks that nobody is in any more since the last update.
 
-        Has to be called before the first `update`.
+        Has to be called before the first sort.
         """
         if not self.tracks_vacated:
             self.tracks_vacated = True
@@ -259,7 +259,7 @@ class BlockGrid:
     def insert_all(self, locate: ti.template(), now, tick):
         """`insert` every particle `i` at `locate(i, now, tick)` [m]; to be called at the outermost level of a kernel.
 
-        That, or an `insert` of every particle, and then `place`, sorts anew.
+        That, or an `insert` of every particle, and then `sort`, sorts anew.
         """
         if ti.static(self.serial):
             self.resorting.insert_all(locate, now, tick)
@@ -288,7 +288,7 @@ class BlockGrid:
             self.resorting.insert(i, before, cell)
 
     @ti.func
-    def place(self, identity: ti.template()):
+    def sort(self, identity: ti.template()):
         """Sort all that have been inserted, in a cell in the order of `identity`, at the outermost level of a kernel."""
         if ti.static(self.serial):
             self.resorting.sort(identity)

@@ -123,7 +123,7 @@ class Motion:
     def sort_particles(self, now: ti.i32, tick: float):
         """Algorithm 1, line 4: sort every particle into the cell of its present position."""
         self.grid.insert_all(self.present_position, now, tick)
-        self.grid.place(self.particles.identity)
+        self.grid.sort(self.particles.identity)
 
     @ti.func
     def present_position(self, i, now, tick):

@@ -31,8 +31,8 @@ class Surroundings:
         """Index differences to the other blocks of a column across x."""
 
     @ti.func
-    def visit(self, wanted: ti.template(), smallest: ti.template(), rest, now, passed):
-        """Call `wanted.finish(block, around, now, passed)` for every occupied block.
+    def visit(self, wanted: ti.template(), smallest: ti.template(), rest):
+        """Call `wanted.finish(block, around)` for every occupied block.
 
         `around` is the smallest, or with `smallest` False the largest, of `wanted.read(other)` of the blocks around it, and not
         beyond `rest`. To be called at the outermost level of a kernel, where its loops run in parallel.
@@ -57,7 +57,7 @@ class Surroundings:
                         own, here = wanted.read(block), self.column(wanted, smallest, block, rest)
                     next_own, next_here = wanted.read(block + 1), self.column(wanted, smallest, block + 1, rest)
                     around = self.further(smallest, self.further(smallest, before, here), next_own)
-                    wanted.finish(block, self.further(smallest, around, next_here), now, passed)
+                    wanted.finish(block, self.further(smallest, around, next_here))
                     last = block
                     m += 1
         else:
@@ -66,7 +66,7 @@ class Surroundings:
                 around = rest
                 for k in ti.static(range(len(self.geometry.offsets))):
                     around = self.further(smallest, around, wanted.read(self.geometry.beside(block, k)))
-                wanted.finish(block, around, now, passed)
+                wanted.finish(block, around)
 
     @ti.func
     def column(self, wanted: ti.template(), smallest: ti.template(), block, rest):

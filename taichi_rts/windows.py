@@ -26,7 +26,8 @@ ROOM = 1.5  # of a window, over what lies around a run of blocks at rest
 AT_ONCE = {2: 1, 3: 8}
 """Fluid entries that are copied as one vector, by dimension: mostly all of a cell's, so that no branch is mispredicted.
 
-In two dimensions, and on walls, cells hold so few that it gains nothing and takes longer to compile.
+In two dimensions, and on walls, cells hold so few that it gains nothing and takes longer to compile. No more than lists have room
+for behind their last entry (`Backend.lanes`), and windows (`VECTOR`).
 """
 INDEX = 0x0FFFFFFF
 """Masks an index, by which LLVM sees that adding a few does not overflow; else it would not find out that they are one vector.
@@ -125,7 +126,9 @@ class Windows:
                 cell = self.cell(row, column, above) + part
                 first, last = self.start[cell], self.start[cell + 1]
                 k = first
-                while True:  # seldom more than once; what is copied beyond `last` the next cell overwrites
+                while (
+                    True
+                ):  # seldom more than once; what is copied beyond `last`, or of an empty cell, the next overwrites
                     self.copy(copies, self.bounded(k), self.bounded(n + k - first), row, column, above)
                     k += self.stride[None]
                     if k >= last:
@@ -347,7 +350,7 @@ class NeighbourSum:
         base, number = thread * self.windows.size, thread * self.windows.columns
         n, held = base, 0
         most = ti.min(most, ti.min(RUN, self.grid.geometry.shape[0] - 1 - column))
-        fits = True
+        fits = self.windows.count(row, column - 1) <= self.windows.capacity
         while fits:
             n = self.windows.gather(self.copies, row, column - 1 + held, number + held * CELLS_PER_BLOCK, n)
             held += 1

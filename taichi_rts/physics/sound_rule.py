@@ -96,7 +96,7 @@ class SoundRule:
             if self.is_stale(block, read_at[block]):
                 self.look_at(block, now, tick)
             self.felt[block] = ti.max(self.wish[block], 0.5 * self.target[block])
-        self.around.visit(self, False, ti.Vector([0.0, 0.0]), now, 0)
+        self.around.visit(self, False, ti.Vector([0.0, 0.0]))
 
     @ti.kernel
     def work_out_some(
@@ -117,7 +117,7 @@ class SoundRule:
                 around = ti.Vector([0.0, 0.0])
                 for k in ti.static(range(len(self.geometry.offsets))):
                     around = ti.max(around, self.read(self.geometry.beside(block, k)))
-                self.finish(block, around, time[block], 0)
+                self.finish(block, around)
 
     @ti.func
     def is_stale(self, block, read_at):
@@ -167,7 +167,7 @@ class SoundRule:
         return ti.Vector([self.felt[block], self.wish_ceiling[block]])
 
     @ti.func
-    def finish(self, block, around, now, passed):
+    def finish(self, block, around):
         """Work out the new target of an occupied block from its own wish and from what is seen of those `around` it.
 
         That is their wishes, and half of their targets so far.

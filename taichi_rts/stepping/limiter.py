@@ -38,8 +38,10 @@ class BlockLimiter:
 class Sweep:
     """Writes the limited steps of `source` to `target`, (blocks,) [base steps], for `Surroundings.visit`.
 
-    `then(block, now, passed)`, a ti.func, is called for each block that is done.
+    `then(block)`, a ti.func, is called for each block that is done.
     """
+
+    transient = frozenset({"then", "goes_on"})
 
     def __init__(
         self, limiter: BlockLimiter, source: ti.Field, target: ti.Field, factor: int, jump: int, then: Any = None
@@ -55,11 +57,11 @@ class Sweep:
         return self.source[block]
 
     @ti.func
-    def finish(self, block, shortest, now, passed):
+    def finish(self, block, shortest):
         """Limit the step of `block` beside others, the shortest of which is given."""
         self.target[block] = self.limiter.limited(self.source[block], shortest, self.factor, self.jump)
         if ti.static(self.goes_on):
-            self.then(block, now, passed)
+            self.then(block)
 
 
 @ti.data_oriented

@@ -39,7 +39,7 @@ class RegionalSchedule(Schedule):
     `block_level` is the region of each block (`BlockLimiter.EMPTY` where there is no particle).
     """
 
-    transient = frozenset({"scan", "occupancy", "updates", "rows", "ends"})
+    transient = frozenset({"scan", "occupancy", "updates", "rows", "present", "passed", "ends"})
 
     def __init__(self, stepper: "Regional", scene: Scene, particles: Particles, grid: BlockGrid) -> None:
         super().__init__(particles, grid)
@@ -66,8 +66,9 @@ class RegionalSchedule(Schedule):
         self.aligned = self.by_sound or stepper.resolved("steps") != "integers"
         self.levels_double = self.aligned
         self.limiter = NeighbourLimiter(doubling=False)
-        self.until_next, self.ends = ti.field(ti.i32, ()), ti.field(ti.i32, ())
-        """Ticks to the end of the first step that ends; bit n - 1: whether aligned steps of n ticks end now."""
+        self.until_next = ti.field(ti.i32, ())
+        self.present, self.passed, self.ends = (ti.field(ti.i32, ()) for _ in range(3))
+        """Tick, ticks since the last call, and whether aligned steps of n ticks end now, in bit n - 1."""
         self.now = 0
         reach = NeighbourLimiter.RATIO if self.by_sound else 1  # the sound speed has spread by a block already
         ratio_sweeps = max(0, math.ceil(math.log2(self.levels)) - 1) if self.limits else 0
@@ -152,11 +153,23 @@ class RegionalSchedule(Schedule):
     @ti.kernel
     def decide(self, now: ti.i32, passed: ti.i32, tick: float, reach: float):
         """All of it; `passed` ticks have gone by since the last call. One kernel, for launches cost more than its loops."""
+        self.note_time(now, passed)
         self.forget_vacated()
-        self.determine_regions(now, passed, tick, reach)
-        self.apply_minimum_region(now, passed)
+        self.determine_regions(now, tick, reach)
+        self.apply_minimum_region()
         self.find_due_starts(now)
         self.list_due()
+
+    @ti.func
+    def note_time(self, now, passed):
+        """Keep what `settle` has to know, and find which aligned steps end now."""
+        self.present[None], self.passed[None] = now, passed
+        if ti.static(self.aligned):
+            self.until_next[None] = self.levels
+            ends = 0
+            for n in ti.static(self.lengths):
+                ends |= ti.cast(now % n == 0, ti.i32) << (n - 1)
+            self.ends[None] = ends
 
     @ti.func
     def forget_vacated(self):
@@ -174,9 +187,11 @@ class RegionalSchedule(Schedule):
             self.read_at[block] = -1
 
     @ti.func
-    def determine_regions(self, now, passed, tick, reach):
-        """Lines 6-9: maxima of |v| and F/m over each block, and the largest n that Eq. 2 and 3 allow."""
-        self.find_ends(now)
+    def determine_regions(self, now, tick, reach):
+        """Lines 6-9: maxima of |v| and F/m over each block, and the largest n that Eq. 2 and 3 allow.
+
+        Where no sweep follows, lines 10-16 as well.
+        """
         for m in range(self.grid.occupied_count[None]):
             block = self.grid.occupied[m]
             level = 1
@@ -199,16 +214,7 @@ class RegionalSchedule(Schedule):
                         level = self.limiter.settled(level, before, now)
             self.own_level[block] = level
             if ti.static(len(self.sweeps) == 0):
-                self.settle(block, now, passed)
-
-    @ti.func
-    def find_ends(self, now):
-        """Find which aligned steps end now."""
-        self.until_next[None] = self.levels
-        ends = 0
-        for n in ti.static(self.lengths):
-            ends |= ti.cast(now % n == 0, ti.i32) << (n - 1)
-        self.ends[None] = ends
+                self.settle(block)
 
     @ti.func
     def has_stepped(self, block):
@@ -266,21 +272,21 @@ class RegionalSchedule(Schedule):
         return level
 
     @ti.func
-    def apply_minimum_region(self, now, passed):
+    def apply_minimum_region(self):
         """R_min of Section 3, then the sweeps of the limiter and of grading, which spread by a block each.
 
         The last goes on with lines 10-16 for each block that it is done with.
         """
         for sweep in ti.static(self.sweeps):
-            self.around.visit(sweep, True, BlockLimiter.EMPTY, now, passed)
+            self.around.visit(sweep, True, BlockLimiter.EMPTY)
 
     @ti.func
-    def settle(self, block, now, passed):
+    def settle(self, block):
         """Lines 10-16 for the particles of `block`, whose level is found."""
         if ti.static(self.aligned):
-            self.update_aligned_validity(block, now, passed)
+            self.update_aligned_validity(block, self.present[None], self.passed[None])
         else:
-            self.update_validity(block, now, passed)
+            self.update_validity(block, self.present[None], self.passed[None])
 
     @ti.func
     def update_validity(self, block, now, passed):
@@ -377,9 +383,9 @@ class RegionalSchedule(Schedule):
         """
         if ti.static(self.levels == 1):  # where all are due
             for m in range(self.grid.occupied_count[None]):
-                self.finish(self.grid.occupied[m], 0, 0, 0)
+                self.finish(self.grid.occupied[m], 0)
         else:
-            self.around.visit(self, False, 0, 0, 0)
+            self.around.visit(self, False, 0)
 
     @ti.func
     def read(self, block):
@@ -387,7 +393,7 @@ class RegionalSchedule(Schedule):
         return self.block_due[block]
 
     @ti.func
-    def finish(self, block, due_beside, now, passed):
+    def finish(self, block, due_beside):
         """List who is due in `block`, and have it read if somebody is there or, `due_beside`, beside it."""
         if self.block_due[block] > 0:
             n = self.due_start[block]

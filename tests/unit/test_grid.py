@@ -45,7 +45,7 @@ class SortedCloud:
     def place(self):
         for i in range(self.count):
             self.grid.insert(i, self.x[i])
-        self.grid.place(self.identity)
+        self.grid.sort(self.identity)
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -52,7 +52,7 @@ def test_no_block_keeps_more_than_its_neighbours_raw_level_plus_jump(taichi_cpu,
 
     @ti.kernel
     def limit():
-        around.visit(sweep, True, EMPTY, 0, 0)
+        around.visit(sweep, True, EMPTY)
 
     for seed in range(3):
         raw = random_levels(geometry, seed=seed)
@@ -73,7 +73,7 @@ def apply_minimum_region(schedule, occupied):
 
     @ti.kernel
     def run():
-        schedule.apply_minimum_region(0, 0)
+        schedule.apply_minimum_region()
 
     run()
 
