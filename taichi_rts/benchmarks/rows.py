@@ -23,7 +23,6 @@ from taichi_rts.benchmarks.scenes import FRONT_TIME, peers_dam_break
 from taichi_rts.stepping.regional import LARGEST_COURANT
 
 SETTLED = 0.05  # [s]: the column has left its lattice
-WCSPH_TIME = 0.1 * FRONT_TIME  # [s]: the peer's slowest solver is run no further
 
 
 @dataclass(frozen=True)
@@ -128,8 +127,8 @@ def simulated_second(settings: Settings) -> Iterator[Row]:
 
         size = millions(run_ours())
         if peers.peer_is_there(settings.peer_script):
-            for method, end in (("dfsph", FRONT_TIME), ("wcsph", WCSPH_TIME)):
-                if run := peers.run_peer(settings.peer_script, method, cells, end, settings.threads):
+            for method in bars:
+                if run := peers.run_peer(settings.peer_script, method, cells, FRONT_TIME, settings.threads):
                     theirs[method] = run
                     run_ours()
         medians = {name: float(np.median(walls[name])) for name in speeds}
@@ -137,7 +136,7 @@ def simulated_second(settings: Settings) -> Iterator[Row]:
             yield Row(f"Regional, {name}, wall s per simulated s", size, wall, "", note=f"front {fronts[name]:.4f} m")
         for method, run in theirs.items():
             wall = run["wall_per_simulated_second"]
-            note = f"front {run['front']:.4f} m" if method == "dfsph" else f"of {WCSPH_TIME:g} s"
+            note = f"front {run['front']:.4f} m"
             yield Row(f"SPlisHSPlasH {method.upper()}, wall s per simulated s", size, wall, "", note=note)
             for (name, own), bar in zip(medians.items(), bars[method], strict=True):
                 yield Row(f"{method.upper()} over Regional, {name}", size, wall / own, "x", bar)
