@@ -176,7 +176,8 @@ class Simulation:
         self._gravity_work = 0.0
         self._initial_momentum = self.momentum()
         began = clock.perf_counter()
-        self._update_grid(self.timeline.now, self.timeline.tick)  # so that the first step puts them in this order
+        # So that the first step puts them in this order.
+        self.motion.sort_particles(self.timeline.now, self.timeline.tick)
         self._start()
         self.setup_seconds = clock.perf_counter() - began
 
@@ -218,11 +219,8 @@ class Simulation:
             if self.grid.tracks_arrivals:
                 self.grid.arrived.fill(1)  # so that all blocks are looked at now and then
         self._sorts += 1
-        self._update_grid(now, tick)
-        self.schedule.sorted(now, tick)
-
-    def _update_grid(self, now: int, tick: float) -> None:
         self.motion.sort_particles(now, tick)
+        self.schedule.sorted(now, tick)
 
     def advance_to(self, time: float) -> None:
         """Run all steps up to physical `time` [s]; readers then predict to exactly that time.

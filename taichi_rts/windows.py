@@ -126,9 +126,8 @@ class Windows:
                 cell = self.cell(row, column, above) + part
                 first, last = self.start[cell], self.start[cell + 1]
                 k = first
-                while (
-                    True
-                ):  # seldom more than once; what is copied beyond `last`, or of an empty cell, the next overwrites
+                # Seldom more than once; what is copied beyond `last`, or of an empty cell, the next overwrites.
+                while True:
                     self.copy(copies, self.bounded(k), self.bounded(n + k - first), row, column, above)
                     k += self.stride[None]
                     if k >= last:

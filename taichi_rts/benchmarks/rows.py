@@ -100,40 +100,41 @@ def uniform_against_peer(settings: Settings) -> Iterator[Row]:
             yield Row("the ratio of both", size, rate / float(np.mean(seen)), "x", ">= 6")
 
 
+def run_to_front(settings: Settings, scene: rts.Scene, stepper: rts.Regional) -> tuple[float, float, int]:
+    """Run `scene` anew; return wall time per simulated second, where the front then is [m], and the number of particles."""
+    settings.start()
+    sim = rts.Simulation(scene, stepper)
+    sim.advance_to(FRONT_TIME)
+    return sim.statistics["wall_seconds"] / FRONT_TIME, float(sim.positions()[:, 0].max()), sim.count
+
+
 def simulated_second(settings: Settings) -> Iterator[Row]:
     """Wall time per simulated second at the defaults of `Regional`, and where the front then is, beside SPlisHSPlasH.
 
     Ours is the median of the runs before and after each of the peer's.
     """
-    speeds = ("one sound speed", "regional sound speed")
     bars = {"dfsph": (">= 2.5", ">= 4"), "wcsph": (">= 10", ">= 16")}
+    methods = list(bars) if peers.peer_is_there(settings.peer_script) else []
     for cells in (settings.cells(40), settings.cells(60)):
         scene = peers_dam_break(cells)
-        walls: dict[str, list[float]] = {name: [] for name in speeds}
-        fronts: dict[str, float] = {}
+        # The default's longest step with the regional sound speed as well, whose own default is shorter.
+        ours = {
+            "one sound speed": (scene, rts.Regional()),
+            "regional sound speed": (scene.replace(sound_speed="regional"), rts.Regional(courant=LARGEST_COURANT)),
+        }
+        runs = {name: [run_to_front(settings, *each)] for name, each in ours.items()}
         theirs: dict[str, dict[str, float]] = {}
-
-        def run_ours(scene: rts.Scene = scene, walls: Any = walls, fronts: Any = fronts) -> int:
-            for name in speeds:
-                settings.start()
-                regional = name != speeds[0]
-                # The default's longest step with the regional sound speed as well, whose own default is shorter.
-                stepper = rts.Regional(courant=LARGEST_COURANT) if regional else rts.Regional()
-                sim = rts.Simulation(scene.replace(sound_speed="regional") if regional else scene, stepper)
-                sim.advance_to(FRONT_TIME)
-                walls[name].append(sim.statistics["wall_seconds"] / FRONT_TIME)
-                fronts[name] = float(sim.positions()[:, 0].max())
-            return sim.count
-
-        size = millions(run_ours())
-        if peers.peer_is_there(settings.peer_script):
-            for method in bars:
-                if run := peers.run_peer(settings.peer_script, method, cells, FRONT_TIME, settings.threads):
-                    theirs[method] = run
-                    run_ours()
-        medians = {name: float(np.median(walls[name])) for name in speeds}
+        for method in methods:
+            if run := peers.run_peer(settings.peer_script, method, cells, FRONT_TIME, settings.threads):
+                theirs[method] = run
+                for name, each in ours.items():
+                    runs[name].append(run_to_front(settings, *each))
+        medians = {name: float(np.median([wall for wall, _front, _count in each])) for name, each in runs.items()}
+        _wall, _front, count = runs["one sound speed"][0]
+        size = millions(count)
         for name, wall in medians.items():
-            yield Row(f"Regional, {name}, wall s per simulated s", size, wall, "", note=f"front {fronts[name]:.4f} m")
+            _wall, front, _count = runs[name][-1]
+            yield Row(f"Regional, {name}, wall s per simulated s", size, wall, "", note=f"front {front:.4f} m")
         for method, run in theirs.items():
             wall = run["wall_per_simulated_second"]
             note = f"front {run['front']:.4f} m"
