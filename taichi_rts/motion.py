@@ -238,6 +238,7 @@ class Motion:
         self.particles.v[i] = v
         self.particles.a[i] = a_new
         self.particles.updated[i] = present
+        due.evaluated(i, a_new, tick)
 
     @ti.kernel
     def export(

@@ -154,7 +154,7 @@ class AsynchronousSchedule(Cells):
         self.powers_of_two = stepper.steps == "powers_of_two"
         self.staggered = stepper.stagger is not None
         self.seed = stepper.stagger or 0
-        self.limiter = NeighbourLimiter(doubling=True, aligned=self.powers_of_two)
+        self.limiter = NeighbourLimiter(aligned=self.powers_of_two)
         self.slow_speed = criteria.MACH * scene.least_wave_speed
         self.by_sound = scene.regional_sound is not None
         self.viscous_reach = criteria.viscous_step(scene.support, 1.0) * (1.0 + 1e-6)  # [m^2]
@@ -363,8 +363,8 @@ class AsynchronousSchedule(Cells):
             if self.block_due[block] > 0:
                 step = self.proposal[block]
                 if ti.static(self.stepper.limiter):
-                    shortest = self.beside.shortest_beside(self.proposal, block)
-                    step = self.rounded(self.beside.limited(step, shortest, self.limiter.RATIO, 0))
+                    shortest = self.shortest_beside(self.proposal, block)
+                    step = self.rounded(self.limiter.limited(step, shortest))
                 for n in range(self.due_start[block], self.due_start[block] + self.block_due[block]):
                     i = self.grid.order[self.due[n]]
                     self.particles.level[i] = step

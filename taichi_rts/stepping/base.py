@@ -57,6 +57,7 @@ class Schedule:
             where none does.
         base_ticks: ticks in one base step.
         levels: number of levels; level n steps every n base steps.
+        aligned: whether steps end at multiples of themselves.
         levels_double: whether steps come in octaves rather than one by one, which is how pictures and tables group them.
         needs_sorting: whether the grid has to be sorted before the present step.
         sound: the rule of the regional sound speed (`SoundRule`), or None; `needs_sound` says whether it has to be worked out
@@ -67,6 +68,7 @@ class Schedule:
 
     levels = 1
     levels_double = False
+    aligned = False
     base_ticks = 1
     needs_sorting = True
     needs_sound = True
@@ -112,6 +114,10 @@ class Schedule:
 
     def select(self, now: int, tick: float) -> None:
         """Decide who is due at tick `now` (Algorithm 1, lines 5-16)."""
+
+    @ti.func
+    def evaluated(self, i, acceleration, tick):
+        """Take note of the new `acceleration` [m/s^2] of the due particle `i`; `tick` [s]."""
 
     def observe(self, now: int, tick: float) -> None:
         """Look at the state after a step, to choose the next."""

@@ -9,7 +9,7 @@ from taichi_rts.grid import BlockGrid
 from taichi_rts.particles import Particles
 from taichi_rts.scan import ExclusiveScan
 from taichi_rts.stepping.base import Schedule
-from taichi_rts.stepping.limiter import BlockLimiter
+from taichi_rts.stepping.limiter import EMPTY
 
 
 @ti.data_oriented
@@ -19,12 +19,11 @@ class Cells(Schedule):
     `levels` ticks are the longest step.
     """
 
-    EMPTY = BlockLimiter.EMPTY
+    EMPTY = EMPTY
 
     def __init__(self, particles: Particles, grid: BlockGrid, levels: int) -> None:
         super().__init__(particles, grid)
         self.levels = levels
-        self.beside = BlockLimiter(grid.geometry)
         blocks = grid.geometry.blocks
         self.blocks = blocks
         self.occupied, self.occupied_count = grid.occupied, grid.occupied_count
@@ -90,6 +89,14 @@ class Cells(Schedule):
         """
         return self.particles.updated[i] < time or self.end(i) == time
 
+    @ti.func
+    def shortest_beside(self, steps, block):
+        """Least of `steps` of the blocks around `block`; `EMPTY` if they are."""
+        shortest = self.EMPTY
+        for k in ti.static(range(len(self.grid.geometry.offsets))):
+            shortest = ti.min(shortest, steps[self.grid.geometry.beside(block, k)])
+        return shortest
+
     @ti.kernel
     def find_youngest(self):
         """T_min: the earliest time of all cells."""
@@ -113,7 +120,7 @@ class Cells(Schedule):
             block = self.occupied[m]
             time, youngest = self.time[block], self.youngest[None]
             ready = self.EMPTY
-            if youngest <= target and time < cycle_end and time <= self.beside.shortest_beside(self.time, block):
+            if youngest <= target and time < cycle_end and time <= self.shortest_beside(self.time, block):
                 ready = time
                 for k in range(self.grid.first(block), self.grid.first(block + 1)):
                     i = self.grid.order[k]
@@ -126,7 +133,7 @@ class Cells(Schedule):
         """Every cell is interpolated to one time in a pass: the youngest of the ready cells around it has the claim."""
         for m in range(self.occupied_count[None]):
             block = self.occupied[m]
-            self.claim[block] = ti.min(self.ready[block], self.beside.shortest_beside(self.ready, block))
+            self.claim[block] = ti.min(self.ready[block], self.shortest_beside(self.ready, block))
 
     @ti.kernel
     def choose_cells(self):
@@ -136,7 +143,7 @@ class Cells(Schedule):
             time = self.ready[block]
             due = 0
             if time != self.EMPTY and time <= self.claim[block]:
-                if time <= self.beside.shortest_beside(self.claim, block):
+                if time <= self.shortest_beside(self.claim, block):
                     for k in range(self.grid.first(block), self.grid.first(block + 1)):
                         due += ti.cast(self.is_due(self.grid.order[k], time), ti.i32)
             self.block_due[block] = due

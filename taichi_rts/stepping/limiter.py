@@ -1,65 +1,121 @@
 """Limits between neighbouring blocks: how much longer than its neighbours' a block's step may be, and how it may grow."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import taichi as ti
 
-from taichi_rts.grid import Geometry
+
+EMPTY = 1 << 30
+"""Level of a block without particles: it limits no other."""
 
 
 @ti.data_oriented
-class BlockLimiter:
-    """What blocks allow each other. Neighbours are the 8 (26) blocks around; empty ones (`EMPTY`) limit nobody."""
+class Ladder:
+    """The levels that blocks may have, ascending: what lies one above another."""
 
-    EMPTY = 1 << 30
-
-    def __init__(self, geometry: Geometry) -> None:
-        self.geometry = geometry
+    def __init__(self, levels: Sequence[int]) -> None:
+        self.levels = list(levels)
 
     @ti.func
-    def shortest_beside(self, steps, block):
-        """Shortest step of the blocks around `block`; `EMPTY` if they are."""
-        shortest = self.EMPTY
-        for k in ti.static(range(len(self.geometry.offsets))):
-            shortest = ti.min(shortest, steps[self.geometry.beside(block, k)])
-        return shortest
+    def above(self, level):
+        """The next of the levels above `level`; the last if there is none."""
+        found = self.levels[-1]
+        for k in ti.static(range(len(self.levels) - 1, -1, -1)):
+            if self.levels[k] > level:
+                found = self.levels[k]
+        return found
 
     @ti.func
-    def limited(self, step, shortest, factor, jump):
-        """Lower `step` to `factor` times the `shortest` of the neighbours plus `jump`.
+    def grown(self, wanted, before, beside, now, most: ti.template()):
+        """Level at tick `now` of a block that had `before` and wants `wanted`, where the least level `beside` it was that.
 
-        `factor = 1, jump = 0` is the paper's R_min: the outer layer of the slower side takes the faster side's step. `jump = 1`
-        is one sweep of grading.
+        Less at once, more only by one level at a time, at a multiple of the new one, and only if the blocks beside it allowed the
+        new one already: `most(beside)`. A block that were to grow on and be cut back by its neighbours would flicker.
         """
-        return step if shortest == self.EMPTY else ti.min(step, factor * shortest + jump)
+        level = wanted
+        if wanted > before:
+            level = before
+            next_level = self.above(before)
+            if now % next_level == 0 and (beside == EMPTY or next_level <= most(beside)):
+                level = next_level
+        return level
 
 
 @ti.data_oriented
 class Sweep:
-    """Writes the limited steps of `source` to `target`, (blocks,) [base steps], for `Surroundings.visit`.
+    """Writes the limited levels of `source` to `target`, (blocks,), for `Surroundings.visit`.
 
+    A block's level becomes at most `most(shortest)`, a ti.func of the least level of the 8 (26) blocks around it.
     `then(block)`, a ti.func, is called for each block that is done.
     """
 
-    transient = frozenset({"then", "goes_on"})
+    transient = frozenset({"most", "then", "goes_on"})
+    sees_last = False
 
-    def __init__(
-        self, limiter: BlockLimiter, source: ti.Field, target: ti.Field, factor: int, jump: int, then: Any = None
-    ) -> None:
-        self.limiter = limiter
-        self.source, self.target = source, target
-        self.factor, self.jump = factor, jump
+    def __init__(self, source: ti.Field, target: ti.Field, most: Any, then: Any = None) -> None:
+        self.source, self.target, self.most = source, target, most
         self.then, self.goes_on = then, then is not None
 
     @ti.func
     def read(self, block):
-        """The step [base steps] that neighbours see."""
+        """The level that neighbours see."""
         return self.source[block]
 
     @ti.func
     def finish(self, block, shortest):
-        """Limit the step of `block` beside others, the shortest of which is given."""
-        self.target[block] = self.limiter.limited(self.source[block], shortest, self.factor, self.jump)
+        """Limit the level of `block` beside others, the least of which is given."""
+        level = self.source[block]
+        if shortest != EMPTY:
+            level = ti.min(level, self.most(shortest))
+        self.target[block] = level
+        if ti.static(self.goes_on):
+            self.then(block)
+
+
+@ti.data_oriented
+class GrowingSweep:
+    """The first `Sweep` where levels grow slowly: R_min on what blocks allow themselves, and only then growth.
+
+    The other way round R_min would be contagious: it would act on levels that growth has cut to those of the last step, which R_min had
+    lowered then, and the border would walk outwards by a block a step.
+
+    `source` is what blocks allow themselves, `last` their level of the last step, `present` holds the tick; `growth` is the limit on
+    a level beside the last ones of its neighbours.
+    """
+
+    transient = frozenset({"most", "growth", "then", "goes_on"})
+    sees_last = True
+
+    def __init__(
+        self,
+        source: ti.Field,
+        last: ti.Field,
+        target: ti.Field,
+        ladder: Ladder,
+        most: Any,
+        growth: Any,
+        present: ti.Field,
+        then: Any = None,
+    ) -> None:
+        self.source, self.last, self.target, self.present = source, last, target, present
+        self.ladder, self.most, self.growth = ladder, most, growth
+        self.then, self.goes_on = then, then is not None
+
+    @ti.func
+    def read(self, block):
+        """What a block allows itself, and its last level."""
+        return ti.Vector([self.source[block], self.last[block]])
+
+    @ti.func
+    def finish(self, block, around):
+        """Find the level of `block`; `around` holds the least of what neighbours allow themselves and of their last levels."""
+        level, before = self.source[block], self.last[block]
+        if around[0] != EMPTY:
+            level = ti.min(level, self.most(around[0]))
+        if before != EMPTY:
+            level = self.ladder.grown(level, before, around[1], self.present[None], self.growth)
+        self.target[block] = level
         if ti.static(self.goes_on):
             self.then(block)
 
@@ -68,16 +124,15 @@ class Sweep:
 class NeighbourLimiter:
     """The neighbour limiter of `Regional` and `Asynchronous` (Saitoh & Makino 2009; Durier & Dalla Vecchia 2012).
 
-    Between neighbours: no step exceeds `RATIO` times a neighbour's, and whoever is in the middle of a longer one is woken:
+    Between neighbours: no step exceeds `RATIO` times a neighbour's, and a particle in the middle of a longer one is woken:
     its step ends at the present time and is corrected with the time that really elapsed (`woken_end`).
-    In time: a step shrinks at once; it grows by one level, and only when synchronised, i.e. at a tick that is a whole number
-    of the longer steps (`settled`). `doubling` says what one level is: twice the step, or one base step more.
+    In time: a step shrinks at once; it grows by doubling, and with `aligned` only when synchronised, i.e. at a tick that is a whole
+    number of the longer steps (`settled`). `Regional` has levels that need not be powers of two: `Ladder.grown`.
     """
 
     RATIO = 2
 
-    def __init__(self, doubling: bool, aligned: bool = True) -> None:
-        self.doubling = doubling
+    def __init__(self, aligned: bool = True) -> None:
         self.aligned = aligned
 
     @ti.func
@@ -85,16 +140,16 @@ class NeighbourLimiter:
         """Step [ticks] that a block at tick `now` may take after a step of `current`, if it wants `wanted`."""
         step = wanted
         if wanted > current:
-            step = ti.min(wanted, self.next_level(current))
+            step = ti.min(wanted, 2 * current)
             if ti.static(self.aligned):
                 if now % step != 0:
                     step = current
         return step
 
     @ti.func
-    def next_level(self, step):
-        """The step one level above."""
-        return 2 * step if ti.static(self.doubling) else step + 1
+    def limited(self, step, shortest):
+        """Lower `step` to `RATIO` times the `shortest` of the neighbours."""
+        return step if shortest == EMPTY else ti.min(step, self.RATIO * shortest)
 
     @ti.func
     def woken_end(self, began, step, now, shortest):

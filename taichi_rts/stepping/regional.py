@@ -13,10 +13,13 @@ from taichi_rts.integrators.serna import Serna
 from taichi_rts.particles import Particles
 from taichi_rts.scene import Positive, Scene
 from taichi_rts.stepping import criteria
+from taichi_rts.stepping.aligned import AlignedBlocks
 from taichi_rts.stepping.base import Courant, Schedule
-from taichi_rts.stepping.regions import RegionalSchedule, lengths
+from taichi_rts.stepping.by_sound import BlocksBySound
+from taichi_rts.stepping.regions import lengths
 from taichi_rts.stepping.timeline import Timeline
 from taichi_rts.stepping.uniform import Uniform
+from taichi_rts.stepping.validity import ValidityByParticle
 from taichi_rts.validation import FROZEN, validated
 
 LARGEST_COURANT = 0.6
@@ -162,5 +165,8 @@ class Regional:
         return Timeline(min(step / divisor, criteria.scene_viscous_step(scene)))
 
     def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
-        """Build the schedule of Algorithm 1."""
-        return RegionalSchedule(self.in_scene(scene), scene, particles, grid)
+        """Build the schedule of Algorithm 1: by particle as in the paper, of aligned blocks, or by sound speed."""
+        full = self.in_scene(scene)
+        if scene.regional_sound is not None:
+            return BlocksBySound(full, scene, particles, grid)
+        return (ValidityByParticle if full.steps == "integers" else AlignedBlocks)(full, scene, particles, grid)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from taichi_rts.errors import TimeError
 
 MAX_TICKS = 2**30 - 2**10
-"""Ticks are 32-bit integers on the device, and no step, of 1024 ticks at most, may end at `BlockLimiter.EMPTY`."""
+"""Ticks are 32-bit integers on the device, and no step, of 1024 ticks at most, may end at `limiter.EMPTY`."""
 
 
 @dataclass
