@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 class AlignedBlocks(RegionalSchedule):
     """A block of level n is due at multiples of n base steps; base steps in which nothing is due are passed over.
 
-    What the paper looks for in every base step (lines 5-14) can therefore come too late. Two things shorten the time to the next
-    step (`until_next`): a particle whose new acceleration does not allow its step (`evaluated`), and one that has come from another
-    block and whose own step ends before that of its new block.
+    What the paper looks for in every base step (lines 5-14) can therefore come too late. Two things shorten the time to the
+    next step (`until_next`): a particle whose new acceleration does not allow its step (`evaluated`), and one that has come
+    from another block and whose own step ends before that of its new block.
     """
 
     transient = RegionalSchedule.transient | {"occupancy", "ends"}
@@ -86,8 +86,8 @@ class AlignedBlocks(RegionalSchedule):
     def update_validity(self, block, now, passed):
         """Lines 10-16 for a block: due as a whole at a multiple of its level, or when that has become lower.
 
-        Else due are only those particles that have come into it with a longer step, or whose own step is over. Others that have come with
-        a shorter one keep it until then. Particles of other blocks need not be looked at.
+        Else due are only those particles that have come into it with a longer step, or whose own step is over. Others that
+        have come with a shorter one keep it until then. Particles of other blocks need not be looked at.
         """
         first, end = self.grid.first(block), self.grid.first(block + 1)
         level, before = self.block_level[block], self.last_level[block]
@@ -134,7 +134,7 @@ class AlignedBlocks(RegionalSchedule):
 
     @ti.func
     def note_present(self, present, now):
-        """Find when the next step ends. (An atomic minimum over all blocks would take longer on a CPU.)"""
+        """Find when the next step ends; an atomic minimum over all blocks would take longer on a CPU."""
         until_next = self.until_next[None]
         for n in ti.static(self.lengths):
             if (present >> (n - 1)) & 1 == 1:

@@ -5,7 +5,6 @@ from typing import Any
 
 import taichi as ti
 
-
 EMPTY = 1 << 30
 """Level of a block without particles: it limits no other."""
 
@@ -30,8 +29,8 @@ class Ladder:
     def grown(self, wanted, before, beside, now, most: ti.template()):
         """Level at tick `now` of a block that had `before` and wants `wanted`, where the least level `beside` it was that.
 
-        Less at once, more only by one level at a time, at a multiple of the new one, and only if the blocks beside it allowed the
-        new one already: `most(beside)`. A block that were to grow on and be cut back by its neighbours would flicker.
+        Less at once, more only by one level at a time, at a multiple of the new one, and only if the blocks beside it allowed
+        the new one already: `most(beside)`. A block that were to grow on and be cut back by its neighbours would flicker.
         """
         level = wanted
         if wanted > before:
@@ -77,11 +76,11 @@ class Sweep:
 class GrowingSweep:
     """The first `Sweep` where levels grow slowly: R_min on what blocks allow themselves, and only then growth.
 
-    The other way round R_min would be contagious: it would act on levels that growth has cut to those of the last step, which R_min had
-    lowered then, and the border would walk outwards by a block a step.
+    The other way round R_min would be contagious: it would act on levels that growth has cut to those of the last step, which
+    R_min had lowered then, and the border would walk outwards by a block a step.
 
-    `source` is what blocks allow themselves, `last` their level of the last step, `present` holds the tick; `growth` is the limit on
-    a level beside the last ones of its neighbours.
+    `source` is what blocks allow themselves, `last` their level of the last step, `present` holds the tick; `growth` is the
+    limit on a level beside the last ones of its neighbours.
     """
 
     transient = frozenset({"most", "growth", "then", "goes_on"})
@@ -126,8 +125,8 @@ class NeighbourLimiter:
 
     Between neighbours: no step exceeds `RATIO` times a neighbour's, and a particle in the middle of a longer one is woken:
     its step ends at the present time and is corrected with the time that really elapsed (`woken_end`).
-    In time: a step shrinks at once; it grows by doubling, and with `aligned` only when synchronised, i.e. at a tick that is a whole
-    number of the longer steps (`settled`). `Regional` has levels that need not be powers of two: `Ladder.grown`.
+    In time: a step shrinks at once; it grows by doubling, and with `aligned` only when synchronised, i.e. at a tick that is a
+    whole number of the longer steps (`settled`). `Regional` has levels that need not be powers of two: `Ladder.grown`.
     """
 
     RATIO = 2

@@ -1,7 +1,7 @@
 """Regions and compute flags in regional time stepping: lines 5-17 of Algorithm 1 of Goswami & Batty 2014.
 
-What all schemes share. When a block or a particle is due is the schemes' own: `validity.py` (the paper's, by particle), `aligned.py`
-(blocks whose steps end at multiples of themselves) and `by_sound.py` (the same by the regional sound speed).
+What all schemes share. When a block or a particle is due is the schemes' own: `validity.py` (the paper's, by particle),
+`aligned.py` (blocks whose steps end at multiples of themselves) and `by_sound.py` (the same by the regional sound speed).
 """
 
 import math
@@ -40,9 +40,9 @@ def lengths(steps: str, most: int) -> list[int]:
 class RegionalSchedule(Schedule):
     """Region determination and compute flags: lines 5-17 of Algorithm 1.
 
-    Level n of a block means steps of n base steps; all levels are members of `lengths`, after every rule: a level whose step never
-    ends would never be due. `raw_level` is what a block allows itself, `block_level` its region (`EMPTY` where there is no
-    particle), `last_level` that of the step before.
+    Level n of a block means steps of n base steps; all levels are members of `lengths`, after every rule: a level whose step
+    never ends would never be due. `raw_level` is what a block allows itself, `block_level` its region (`EMPTY` where there is
+    no particle), `last_level` that of the step before.
 
     A scheme adds `update_validity`, which finds what is due in a block.
     """
@@ -125,7 +125,7 @@ class RegionalSchedule(Schedule):
         return sweeps
 
     def ratio_sweeps(self) -> int:
-        """How many sweeps of the neighbour limiter it takes until no block steps `NeighbourLimiter.RATIO` times as long as another."""
+        """How many sweeps it takes until no block steps more than `NeighbourLimiter.RATIO` times as long as a neighbour."""
         return max(0, math.ceil(math.log2(self.levels)) - 1)
 
     @ti.func
@@ -231,7 +231,8 @@ class RegionalSchedule(Schedule):
 
     @ti.func
     def region(self, base_step, reach, speed2, acceleration2, viscosity, density):
-        """Section 2: the largest level whose step satisfies Eq. 2, Eq. 3, the viscous limit and Eq. 1 with the local sound speed.
+        """Section 2: the largest level whose step satisfies Eq. 2, Eq. 3, the viscous limit and Eq. 1 with the local sound
+        speed.
 
         (With c_s Eq. 1 is the same for all blocks: it sets the base step.)
         """

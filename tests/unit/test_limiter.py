@@ -6,11 +6,9 @@ import taichi_rts as rts
 from taichi_rts import backend
 from taichi_rts.grid import BlockGrid, Geometry
 from taichi_rts.particles import Particles
-from taichi_rts.stepping.limiter import BlockLimiter, NeighbourLimiter, Sweep
-from taichi_rts.stepping.regions import RegionalSchedule
+from taichi_rts.stepping.limiter import EMPTY, Ladder, NeighbourLimiter, Sweep
+from taichi_rts.stepping.regions import lengths
 from taichi_rts.surroundings import Surroundings
-
-EMPTY = BlockLimiter.EMPTY
 
 
 def random_levels(geometry, n_max=5, seed=0):
@@ -36,7 +34,7 @@ def lowest_neighbour(geometry, levels):
 
 
 def occupy(grid, blocks):
-    """Let somebody be in `blocks` of `grid`, and nobody elsewhere."""
+    """Let there be particles in `blocks` of `grid`, and none elsewhere."""
     grid.occupied.from_numpy(np.pad(blocks, (0, grid.geometry.blocks - len(blocks))).astype(np.int32))
     grid.occupied_count[None] = len(blocks)
 
@@ -48,7 +46,12 @@ def test_no_block_keeps_more_than_its_neighbours_raw_level_plus_jump(taichi_cpu,
     source, target = ti.field(ti.i32, geometry.blocks), ti.field(ti.i32, geometry.blocks)
     grid = BlockGrid(geometry, 1)
     around = Surroundings(grid)
-    sweep = Sweep(BlockLimiter(geometry), source, target, 1, jump)
+
+    @ti.func
+    def most(level):
+        return level + jump
+
+    sweep = Sweep(source, target, most)
 
     @ti.kernel
     def limit():
@@ -67,34 +70,71 @@ def test_no_block_keeps_more_than_its_neighbours_raw_level_plus_jump(taichi_cpu,
         assert source.to_numpy().tolist() == raw.tolist()
 
 
-def apply_minimum_region(schedule, occupied):
-    """Run the sweeps of `schedule` over the blocks `occupied`."""
-    occupy(schedule.grid, occupied)
+SCENE = rts.Scene(domain=rts.Box((0, 0), (2, 1)), fluids=[rts.Block((0, 0), (0.4, 0.4))], spacing=0.05)
+
+
+def levels_from(stepper, raw_levels, ticks=1):
+    """What blocks allow themselves, which are occupied, and the levels that `stepper` gives them at each of `ticks` steps."""
+    geometry = Geometry((0, 0), (2, 1), SCENE.support)
+    state = Particles(np.zeros((1, 2)), np.zeros((1, 2)), np.ones(1), 1.0, backend.current())
+    schedule = stepper.schedule(SCENE, state, BlockGrid(geometry, 1), stepper.timeline(SCENE))
+    raw = random_levels(geometry, n_max=1)
+    occupied = raw != EMPTY
+    raw[occupied] = raw_levels(np.count_nonzero(occupied))
+    schedule.raw_level.from_numpy(raw)
+    occupy(schedule.grid, np.flatnonzero(occupied))
 
     @ti.kernel
-    def run():
+    def run(now: ti.i32):
+        schedule.note_time(now, 1)
+        if ti.static(schedule.keeps_last):
+            for block in range(schedule.blocks):
+                schedule.last_level[block] = schedule.block_level[block]
         schedule.apply_minimum_region()
 
-    run()
+    found = []
+    for now in range(ticks):
+        run(now)
+        found.append(schedule.block_level.to_numpy())
+    assert (found[-1][~occupied] == EMPTY).all()
+    return geometry, raw, occupied, found
 
 
-@pytest.mark.parametrize("levels", [2, 3, 5])
-def test_grading_leaves_jumps_of_one_and_only_lowers(taichi_cpu, levels):
-    scene = rts.Scene(domain=rts.Box((0, 0), (2, 1)), fluids=[rts.Block((0, 0), (0.4, 0.4))], spacing=0.05)
-    geometry = Geometry((0, 0), (2, 1), scene.support)
-    state = Particles(np.zeros((1, 2)), np.zeros((1, 2)), np.ones(1), 1.0, backend.current())
-    schedule = RegionalSchedule(rts.Regional(levels=levels, grading=True), scene, state, BlockGrid(geometry, 1))
-    raw = random_levels(geometry, n_max=levels)
-    occupied = raw != EMPTY
-    raw[occupied] = levels
-    raw[np.flatnonzero(occupied)[[3, 100]]] = 1  # two fast blocks in a slow fluid
-    schedule.own_level.from_numpy(raw)
-    apply_minimum_region(schedule, np.flatnonzero(occupied))
-    graded = schedule.block_level.to_numpy()
-    assert (graded[~occupied] == EMPTY).all()
+def two_fast_blocks(slow):
+    def raw(count):
+        levels = np.full(count, slow)
+        levels[[3, 100]] = 1
+        return levels
+
+    return raw
+
+
+@pytest.mark.parametrize("steps", ["integers", "half_octaves", "powers_of_two"])
+@pytest.mark.parametrize("levels", [2, 3, 5, 8])
+def test_grading_leaves_jumps_of_one_level_and_only_lowers(taichi_cpu, levels, steps):
+    members = np.array(lengths(steps, levels))
+    stepper = rts.Regional(levels=levels, grading=True, steps=steps, limiter=False)
+    geometry, raw, occupied, (graded,) = levels_from(stepper, two_fast_blocks(members[-1]))
+    lowest = lowest_neighbour(geometry, graded)
     assert (graded <= np.minimum(raw, lowest_neighbour(geometry, raw)))[occupied].all()
-    assert (graded <= lowest_neighbour(geometry, graded) + 1)[occupied].all()
-    assert set(graded[occupied]) == set(range(1, levels + 1))
+    above = np.append(members[1:], members[-1])
+    for block in np.flatnonzero(occupied & (lowest != EMPTY)):
+        assert graded[block] <= above[members.tolist().index(lowest[block])]
+    assert set(graded[occupied]) == set(members)
+
+
+@pytest.mark.parametrize("steps", ["integers", "half_octaves", "powers_of_two"])
+def test_a_frozen_state_keeps_a_fixed_pattern_of_levels(taichi_cpu, steps):
+    stepper = rts.Regional(levels=12, steps=steps, limiter=True)
+    geometry, raw, occupied, found = levels_from(stepper, two_fast_blocks(lengths(steps, 12)[-1]), ticks=200)
+    settled_pattern = found[48]  # every level has been a divisor of a tick since then, and again
+    for levels in found[48:]:
+        assert levels.tolist() == settled_pattern.tolist()
+    assert (settled_pattern <= 2 * lowest_neighbour(geometry, settled_pattern))[occupied].all()
+    # As far as R_min reaches, from what blocks allow themselves and no further.
+    ones = (raw == 1) | ((lowest_neighbour(geometry, raw) == 1) & occupied)
+    assert ((settled_pattern == 1) == ones).all()
+    assert settled_pattern[occupied].max() == lengths(steps, 12)[-1]
 
 
 def settled(limiter, cases):
@@ -111,16 +151,43 @@ def settled(limiter, cases):
     return found.tolist()
 
 
+def test_levels_shrink_at_once_and_grow_by_one_when_synchronised_and_the_blocks_beside_allow_it(taichi_cpu):
+    ladder = Ladder(lengths("half_octaves", 12))
+    rows = [
+        (1, 8, EMPTY, 3, 1),  # wanted, before, least beside, tick: level
+        (8, 8, EMPTY, 3, 8),
+        (8, 2, EMPTY, 3, 3),
+        (8, 2, EMPTY, 4, 2),
+        (8, 4, EMPTY, 12, 6),
+        (8, 4, 3, 12, 6),
+        (8, 4, 2, 12, 4),
+        (12, 12, 1, 12, 12),  # which the sweeps lower, not growth
+        (12, 8, EMPTY, 24, 12),
+    ]
+    table = np.array(rows, dtype=np.int32)
+    found = np.empty(len(rows), dtype=np.int32)
+
+    @ti.func
+    def twice(level):
+        return 2 * level
+
+    @ti.kernel
+    def run(table: ti.types.ndarray(), found: ti.types.ndarray()):
+        for k in range(found.shape[0]):
+            found[k] = ladder.grown(table[k, 0], table[k, 1], table[k, 2], table[k, 3], twice)
+
+    run(table, found)
+    assert found.tolist() == table[:, 4].tolist()
+
+
 def test_steps_shrink_at_once_and_grow_by_one_level_when_synchronised(taichi_cpu):
-    doubling, counting = NeighbourLimiter(doubling=True), NeighbourLimiter(doubling=False)
-    free = NeighbourLimiter(doubling=True, aligned=False)
+    doubling, free = NeighbourLimiter(), NeighbourLimiter(aligned=False)
     assert settled(doubling, [(1, 8, 3), (8, 8, 3), (8, 2, 4), (8, 2, 6), (4, 2, 2), (8, 1, 2)]) == [1, 8, 4, 2, 2, 2]
-    assert settled(counting, [(1, 3, 5), (3, 1, 2), (3, 1, 3), (3, 2, 6), (3, 2, 4)]) == [1, 2, 1, 3, 2]
     assert settled(free, [(9, 3, 7), (5, 3, 7), (2, 3, 7)]) == [6, 5, 2]
 
 
 def test_a_woken_step_ends_now_or_where_twice_the_neighbours_step_would_have(taichi_cpu):
-    limiter = NeighbourLimiter(doubling=True)
+    limiter = NeighbourLimiter()
     cases = np.array([(0, 8, 3, 1), (0, 8, 3, 2), (0, 8, 1, 1), (4, 2, 4, 1), (0, 3, 2, 5)], dtype=np.int32)
     ends = np.empty(len(cases), dtype=np.int32)
 
@@ -134,18 +201,7 @@ def test_a_woken_step_ends_now_or_where_twice_the_neighbours_step_would_have(tai
 
 
 def test_the_limiter_of_regions_halves_the_step_at_most_from_block_to_block(taichi_cpu):
-    scene = rts.Scene(domain=rts.Box((0, 0), (2, 1)), fluids=[rts.Block((0, 0), (0.4, 0.4))], spacing=0.05)
-    geometry = Geometry((0, 0), (2, 1), scene.support)
-    state = Particles(np.zeros((1, 2)), np.zeros((1, 2)), np.ones(1), 1.0, backend.current())
-    schedule = RegionalSchedule(rts.Regional(levels=8, limiter=True), scene, state, BlockGrid(geometry, 1))
-    raw = random_levels(geometry, n_max=8)
-    occupied = raw != EMPTY
-    raw[occupied] = 8
-    raw[np.flatnonzero(occupied)[[3, 100]]] = 1
-    schedule.own_level.from_numpy(raw)
-    apply_minimum_region(schedule, np.flatnonzero(occupied))
-    limited = schedule.block_level.to_numpy()
-    assert (limited[~occupied] == EMPTY).all()
+    geometry, raw, occupied, (limited,) = levels_from(rts.Regional(levels=8, limiter=True), two_fast_blocks(8))
     assert (limited <= np.minimum(raw, lowest_neighbour(geometry, raw)))[occupied].all()
     assert (limited <= 2 * lowest_neighbour(geometry, limited))[occupied].all()
     assert set(limited[occupied]) == {1, 2, 4, 8}

@@ -3,9 +3,8 @@ import pytest
 
 import taichi_rts as rts
 from taichi_rts.grid import CELLS_PER_BLOCK
-from taichi_rts.stepping.limiter import BlockLimiter
+from taichi_rts.stepping.limiter import EMPTY
 
-EMPTY = BlockLimiter.EMPTY
 POOL, JET = rts.Block((0, 0), (1, 0.5)), rts.Block((1.5, 0.1), (1.8, 0.3), velocity=(-9, 0))
 SCENE = rts.Scene(domain=rts.Box((0, 0), (2, 0.8)), fluids=[POOL, JET], spacing=0.04, sound_speed=32)
 STEPPER = rts.Regional(preset="paper", inactive_density="extrapolated")
