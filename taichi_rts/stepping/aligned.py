@@ -86,8 +86,9 @@ class AlignedBlocks(RegionalSchedule):
     def update_validity(self, block, now, passed):
         """Lines 10-16 for a block: due as a whole at a multiple of its level, or when that has become lower.
 
-        Else due are only those particles that have come into it with a longer step, or whose own step is over. Others that
-        have come with a shorter one keep it until then. Particles of other blocks need not be looked at.
+        Else due are only those particles that have come into it with a longer step, or whose own step is over. Others with a
+        shorter one, which have come into it or were there when its level rose, keep it until then. Particles of other blocks
+        need not be looked at.
         """
         first, end = self.grid.first(block), self.grid.first(block + 1)
         level, before = self.block_level[block], self.last_level[block]
@@ -96,14 +97,12 @@ class AlignedBlocks(RegionalSchedule):
             self.held[block] = 0
         self.held[block] = self.held[block] + (end - first) * passed  # `+=` would be atomic
         count, arrived = 0, self.grid.arrived[block]
+        if level > before:  # without the limiter at any tick, in the middle of the steps of its particles
+            arrived = 1
+        waiting, soonest = 0, self.levels
         if (self.ends[None] >> (level - 1)) & 1 == 1 or level < before:
             count = end - first
-            if level != before or arrived > 0:
-                self.grid.arrived[block] = 0
-                for k in range(first, end):
-                    self.particles.level[self.grid.order[k]] = level
         elif arrived > 0:
-            waiting, soonest = 0, self.levels
             for k in range(first, end):
                 i = self.grid.order[k]
                 own = self.particles.level[i]
@@ -112,9 +111,13 @@ class AlignedBlocks(RegionalSchedule):
                     count += 1
                 elif own < level:
                     waiting, soonest = 2, ti.min(soonest, left)
-            self.grid.arrived[block] = waiting
             if waiting > 0:
                 ti.atomic_min(self.until_next[None], soonest)
+        if arrived > 0:
+            self.grid.arrived[block] = waiting
+        if count == end - first and (level != before or arrived > 0):
+            for k in range(first, end):
+                self.particles.level[self.grid.order[k]] = level
         if count > 0:
             self.add(self.updates, level, count)
         if ti.static(not self.grid.serial):
