@@ -90,7 +90,7 @@ class Snapshot:
             sim.motion.not_finite,
             sim.motion.runaways,
         ):
-            counter.fill(0)
+            counter.clear()
         sim.schedule.restart(now)
         sim._tally = Tally(sim.schedule.levels, base_steps=sim.schedule.steps)
         sim._start()
