@@ -54,9 +54,7 @@ class Body:
 def bodies(scene: Scene) -> list[Body]:
     """List the moving obstacles of a scene."""
     found = []
-    periods = tuple(
-        size if around else 0.0 for size, around in zip(scene.domain.size, scene.is_periodic, strict=True)
-    )
+    periods = tuple(size if around else 0.0 for size, around in zip(scene.domain.size, scene.is_periodic, strict=True))
     for number, obstacle in enumerate(scene.obstacles):
         if obstacle.motion is None:
             continue

@@ -34,13 +34,13 @@ class MovingFace(Walls):
         self.at_lower = description.face[1] == "-"
         self.face = (geometry.lower if self.at_lower else geometry.upper)[self.axis]
         times, displacements, velocities = description.times, description.displacements, description.velocities
+        self.shift = ti.field(backend.dtype, fluid.count)
+        """Displacement [m] of the frame at the time of the due particle at each place; `speed` [m/s] is its rate."""
+        self.speed = ti.field(backend.dtype, fluid.count)
         self.table = Timetable(times, [*np.diff(times), 1e30])  # the last piece is the rest after the end
         self.displacement, self.velocity = (ti.field(backend.dtype, self.table.count) for _ in range(2))
         store(self.displacement, np.array(displacements))
         store(self.velocity, np.array([*velocities, 0.0]))
-        self.shift = ti.field(backend.dtype, fluid.count)
-        """Displacement [m] of the frame at the time of the due particle at each place; `speed` [m/s] is its rate."""
-        self.speed = ti.field(backend.dtype, fluid.count)
 
     @ti.func
     def motion(self, now, tick):

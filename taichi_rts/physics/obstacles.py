@@ -207,11 +207,11 @@ class MovingBody(Walls):
         super().__init__(arms, fluid, Geometry(lower.tolist(), upper.tolist(), support), backend)
         self.grid = grid
         self.domain = grid.geometry
-        self.path = Path(body)
         dim, blocks = self.domain.dim, self.domain.blocks
         self.pivot, self.velocity = (ti.Vector.field(dim, float, blocks) for _ in range(2))
         self.turn = ti.Matrix.field(dim, dim, float, blocks)
         self.spin = ti.Vector.field(1 if dim == 2 else 3, float, blocks)
+        self.path = Path(body)
 
     @ti.func
     def block(self, k):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from taichi_rts.stepping.regional import Regional
 
 MOST_HELD = 1 << 30
-"""Particles times steps that a block counts by itself, at most; those of one pass, 32 steps of a block, add less than that again."""
+"""Particles times steps at which a block hands over what it has counted by itself; a pass adds less than that again."""
 
 
 def lengths(steps: str, most: int) -> list[int]:
