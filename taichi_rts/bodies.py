@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 class Body:
     """A moving obstacle, number `number` of its scene, with its geometry at time 0 and its motion.
 
-    `pivot` [m], (dim,), is where the pivot is before it moves, `radius` [m] how far the body reaches from there.
+    `pivot` [m], (dim,), is where the pivot is before it moves, `radius` [m] how far the body reaches from there; `periods` [m],
+    (dim,), are the domain's lengths along periodic axes, 0 along others.
     """
 
     number: int
@@ -26,6 +27,7 @@ class Body:
     pieces: Pieces
     pivot: np.ndarray
     radius: float
+    periods: tuple[float, ...]
 
     @property
     def speeds(self) -> np.ndarray:
@@ -52,6 +54,7 @@ class Body:
 def bodies(scene: Scene) -> list[Body]:
     """List the moving obstacles of a scene."""
     found = []
+    periods = tuple(size if around else 0.0 for size, around in zip(scene.domain.size, scene.is_periodic, strict=True))
     for number, obstacle in enumerate(scene.obstacles):
         if obstacle.motion is None:
             continue
@@ -59,5 +62,5 @@ def bodies(scene: Scene) -> list[Body]:
         pivot = solid.middle if obstacle.motion.pivot is None else np.array(obstacle.motion.pivot)
         corners = np.stack([solid.lower - pivot, solid.upper - pivot])
         radius = float(np.linalg.norm(np.abs(corners).max(axis=0)))
-        found.append(Body(number, solid, obstacle.motion.pieces(scene.dim), pivot, radius))
+        found.append(Body(number, solid, obstacle.motion.pieces(scene.dim), pivot, radius, periods))
     return found

@@ -10,6 +10,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_rts.diagnostics import Tally
+from taichi_rts.physics.timetable import LAST
 from taichi_rts.simulation import Simulation
 from taichi_rts.stepping.base import Stepper
 
@@ -90,7 +91,7 @@ class Snapshot:
             sim.motion.not_finite,
             sim.motion.runaways,
         ):
-            counter.fill(0)
+            counter.clear()
         sim.schedule.restart(now)
         sim._tally = Tally(sim.schedule.levels, base_steps=sim.schedule.steps)
         sim._start()
@@ -115,7 +116,8 @@ class Snapshot:
         put(p.updated, np.full(count, now, np.int32))
         p.identity.from_numpy(np.concatenate([self.ids, np.arange(self.born, p.capacity), gone]).astype(np.int32))
         if self.guided_until is not None:
-            put(p.guided_until, np.ceil(self.guided_until / sim.timeline.tick * (1.0 - 1e-12)).astype(np.int32))
+            until = np.ceil(self.guided_until / sim.timeline.tick * (1.0 - 1e-12))
+            put(p.guided_until, np.minimum(until, LAST).astype(np.int32))
         if p.has_viscosity:
             own = np.full(self.born, sim.scene.viscosities[-1])
             own[: len(sim.start_viscosities)] = sim.start_viscosities

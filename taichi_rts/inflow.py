@@ -6,6 +6,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_rts.particles import Particles
+from taichi_rts.physics.timetable import LAST
 from taichi_rts.sampling import fill_patch
 from taichi_rts.scene import Scene
 
@@ -67,7 +68,7 @@ class Inflows:
             velocity = np.asarray(patch.inflow.velocity)
             for layer in range(self.done[number], patch.entered(time)):
                 x = patch.positions + velocity * (time - patch.crossing(layer))
-                guided_until = math.ceil((patch.crossing(layer) + patch.guidance) / tick)
+                guided_until = min(math.ceil((patch.crossing(layer) + patch.guidance) / tick), LAST)
                 first = particles.count
                 particles.grow(len(x))
                 dtype = particles.numpy_dtype

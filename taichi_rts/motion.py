@@ -5,6 +5,7 @@ from typing import Any
 
 import taichi as ti
 
+from taichi_rts.counters import Counters
 from taichi_rts.grid import BlockGrid
 from taichi_rts.particles import Neighbourhood, Particles
 from taichi_rts.physics.medium import Medium
@@ -51,12 +52,12 @@ class Motion:
         self.largest_speed = RUNAWAY_SPEED * medium.sound_speed
         self.largest_acceleration = RUNAWAY_ACCELERATION * medium.sound_speed**2 / medium.support
         self.geometry = grid.geometry
-        self.stopped = ti.field(ti.i32, ())
+        self.stopped = Counters()
         """How often a face of the domain stopped a centre that wall particles had let through."""
-        self.stopped_by_obstacles = ti.field(ti.i32, ())
+        self.stopped_by_obstacles = Counters()
         """How often an obstacle did."""
-        self.not_finite = ti.field(ti.i32, ())
-        self.runaways = ti.field(ti.i32, ())
+        self.not_finite = Counters()
+        self.runaways = Counters()
         """How often a speed or an acceleration had to be limited: more than never means that the run has blown up."""
 
     @ti.func
@@ -116,7 +117,7 @@ class Motion:
         length2 = vector.norm_sqr()
         if length2 > largest * largest:
             limited = vector * (largest / ti.sqrt(length2))
-            self.runaways[None] += 1
+            self.runaways.add(0, 1)
         return limited
 
     @ti.kernel
@@ -155,9 +156,9 @@ class Motion:
         """Note for every particle that is due in the schedule `due` where the moving walls are at its time."""
         for n in range(due.due_count[None]):
             k = due.due[n]
-            time = ti.cast(now + due.read_at[self.grid.block(self.grid.order[k])], float) * tick
+            present = now + due.read_at[self.grid.block(self.grid.order[k])]
             for wall in ti.static(self.moving_walls):
-                wall.observe(k, time)
+                wall.observe(k, present, tick)
 
     @ti.kernel
     def advance_due(self, due: ti.template(), now: ti.i32, tick: float):
@@ -171,8 +172,7 @@ class Motion:
         present = now + due.read_at[self.grid.block(i)]
         dt = self.elapsed(i, present, tick)
         a = self.particles.a[i]
-        time = ti.cast(present, float) * tick
-        rates = self.momentum.other_rates(k, fluid, time) + by_walls
+        rates = self.momentum.other_rates(k, fluid, present, tick) + by_walls
         a_new = a
         for d in ti.static(range(self.particles.dim)):
             a_new[d] = rates[d]
@@ -198,24 +198,24 @@ class Motion:
             total = self.particles.x[i][d] + v[d] + a_new[d]
             finite = finite and not (ti.math.isnan(total) or ti.math.isinf(total))
         if not finite:
-            self.not_finite[None] += 1
+            self.not_finite.add(0, 1)
         inside = self.geometry.place(x)
         v_free, v_face = v, ti.zero(v)
         for wall in ti.static(self.faces):
-            held = wall.hold(inside, time)
+            held = wall.hold(inside, present, tick)
             if held[wall.axis] != inside[wall.axis]:
-                _displacement, v_face[wall.axis] = wall.motion(time)
+                _displacement, v_face[wall.axis] = wall.motion(present, tick)
             inside = held
         for d in ti.static(range(self.particles.dim)):
             if ti.static(not self.geometry.periodic[d]):
                 if inside[d] != x[d]:
-                    self.stopped[None] += 1
+                    self.stopped.add(0, 1)
                     if (x[d] - inside[d]) * (v[d] - v_face[d]) > 0.0:
                         v[d] = v_face[d]
         for obstacle in ti.static(self.obstacles):
-            held, normal, v_surface = obstacle.hold(inside, time)
+            held, normal, v_surface = obstacle.hold(inside, present, tick, 0.0)
             if normal.norm_sqr() > 0.0:
-                self.stopped_by_obstacles[None] += 1
+                self.stopped_by_obstacles.add(0, 1)
                 inside = self.geometry.place(held)
                 v -= ti.min((v - v_surface).dot(normal), 0.0) * normal
         if ti.static(self.particles.has_budget):
@@ -256,7 +256,7 @@ class Motion:
             dt = self.elapsed(i, now, tick) + ahead
             position = self.position(i, dt, tick)
             for obstacle in ti.static(self.obstacles):
-                held, _normal, _velocity = obstacle.hold(position, ti.cast(now, float) * tick + ahead)
+                held, _normal, _velocity = obstacle.hold(position, now, tick, ahead)
                 position = held
             velocity = self.particles.v[i] + self.particles.a[i] * dt
             if ti.static(self.particles.has_past):

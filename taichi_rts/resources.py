@@ -30,7 +30,7 @@ LINING = 10 * SAMPLING
 """Bytes of the host per boundary particle of an obstacle and dimension: they are chosen from about ten times as many points."""
 COMPILED = 400 << 20
 """Bytes that Python, the compiler and compiled kernels take besides."""
-BLOCK_INTEGERS = {"uniform": 2, "regional": 10, "asynchronous": 9}
+BLOCK_INTEGERS = {"uniform": 1, "regional": 9, "asynchronous": 8}
 """Fields of 32-bit integers that each stepper has with an entry for each block."""
 FIXED = 1 << 14
 """Bytes of fields whose size does not depend on the scene, about."""
@@ -38,6 +38,11 @@ WALL_SHARE = 0.45
 """Entries of the windows on a wall at rest over those of the windows on the fluid, about."""
 SOUND_REALS = 9
 """Fields of reals with an entry for each block that a regional sound speed needs."""
+MOST_ADDRESSED = 2**32 - 1
+"""Bytes of one buffer on Vulkan and Metal, at most: kernels in SPIR-V reckon with 32-bit addresses, beyond which they wrap round.
+
+Taichi puts all fields that are made between two launches of kernels into one buffer, one behind the other.
+"""
 FINEST_POSITION = 0.01
 """Share of the spacing that positions must at least be told apart by."""
 
@@ -52,41 +57,52 @@ def device_bytes(
     on_cpu: bool = True,
 ) -> float:
     """Bytes of all fields of a `Simulation`: what its parts allocate for each particle, wall particle, cell and block."""
+    return sum(buffer_bytes(scene, stepper, precision, debug=debug, spacing=spacing, on_cpu=on_cpu).values())
+
+
+def buffer_bytes(
+    scene: Scene,
+    stepper: Any,
+    precision: str,
+    *,
+    debug: bool = False,
+    spacing: float | None = None,
+    on_cpu: bool = False,
+) -> dict[str, float]:
+    """Bytes of the fields that a `Simulation` makes one after the other, of which none launches a kernel in between, or more."""
     size, dim, real = size_of(scene, spacing), scene.dim, 8 if precision == "f64" else 4
     regional = scene.with_sound_for(stepper).regional_sound is not None
     integrated = scene.density == "continuity"
-    moving = len(scene.moving_walls) + sum(body.motion is not None for body in scene.obstacles)
-    # Reals of `Particles` and `Neighbourhood`, integers of `Particles`, `BlockGrid` and `Schedule`.
-    reals, integers = (3 * dim + 1) + (2 * dim + 2), 3 + 3 + 2
+    faces, turning = len(scene.moving_walls), sum(body.motion is not None for body in scene.obstacles)
+    pose = 2 * dim + dim * dim + (1 if dim == 2 else 3)
+    viscous = len(set(scene.viscosities)) > 1
+    # Reals and integers of `Particles`.
+    reals, integers = 3 * dim + 1, 3 + 1 + bool(scene.inflows)
     reals += 1 if stepper.extrapolates_density or integrated else 0
-    reals += 1 + (dim + 1) if integrated else 0
+    reals += 1 if integrated else 0
     reals += 2 * dim + 1 if stepper.keeps_past else 0
-    reals += 2 if len(set(scene.viscosities)) > 1 else 0
+    reals += 1 if viscous else 0
     reals += 2 if regional else 0
     reals += 3 * dim + 3 if debug else 0
-    reals += 2 * moving
-    integers += 1 + bool(scene.inflows)
-    per_block = (
-        INTEGER
-        * (
-            2 * CELLS_PER_BLOCK
-            + (CELLS_PER_BLOCK + 1) * (1 + moving)
-            + BLOCK_INTEGERS.get(stepper.name, max(BLOCK_INTEGERS.values()))
-        )
-        + real * SOUND_REALS * regional
-    )
+    near = 2 * dim + 2 + (dim + 1) * integrated + viscous
+    per_block = INTEGER * (2 * CELLS_PER_BLOCK + (1 if on_cpu else 3)) + real * SOUND_REALS * regional
+    walls_per_block = INTEGER * (CELLS_PER_BLOCK + 1) * (1 + faces) + real * pose * turning
+    steps_per_block = INTEGER * BLOCK_INTEGERS.get(stepper.name, max(BLOCK_INTEGERS.values()))
     nodes = sum(_nodes(scene, spacing))
     windows = entries(room(dim, (scene.support_ratio * (1.0 + 2.0 * stepper.drift)) ** dim))
-    near = 2 * dim + 2 + (dim + 1) * integrated + (len(set(scene.viscosities)) > 1)
     reals_seen = near + (WALL_SHARE * (2 * dim + 1) if scene.walls and not scene.periodic else 0.0)
-    return (
-        size.particles * (real * reals + INTEGER * integers)
-        + (size.walls + _lining(scene, spacing)) * real * (2 * dim + 1)
+    return {
+        "the particles' state": size.particles * (real * reals + INTEGER * integers),
+        "the particles' order": size.particles * INTEGER * 3,
+        "the grid and what neighbours see": size.particles * real * near
         + size.blocks * per_block
-        + nodes * real
-        + (windows * real * reals_seen + INTEGER * resorting.integers(size.particles, size.blocks) if on_cpu else 0.0)
-        + FIXED
-    )
+        + (windows * real * reals_seen + INTEGER * resorting.integers(size.particles, size.blocks) if on_cpu else 0.0),
+        "walls": (size.walls + _lining(scene, spacing)) * real * (2 * dim + 1)
+        + size.particles * real * 2 * faces
+        + size.blocks * walls_per_block,
+        "the distances from obstacles": nodes * real,
+        "steps": size.particles * INTEGER * 2 + size.blocks * steps_per_block + FIXED,
+    }
 
 
 def host_bytes(scene: Scene, *, spacing: float | None = None) -> float:
@@ -182,6 +198,26 @@ def require_memory(
         )
 
 
+def require_addresses(scene: Scene, steppers: Iterable[Any], backend: Backend, *, debug: bool = False) -> None:
+    """Raise `ResourceError` if fields that share a buffer are larger than what kernels can address on this device."""
+    if backend.arch in ("cpu", "cuda"):  # whose addresses have 64 bits
+        return
+    steppers = list(steppers)
+
+    def largest(spacing: float | None) -> tuple[float, str]:
+        found = (buffer_bytes(scene, each, backend.precision, debug=debug, spacing=spacing) for each in steppers)
+        return max((count, name) for buffers in found for name, count in buffers.items())
+
+    needed, name = largest(None)
+    if needed > MOST_ADDRESSED:
+        best = finest_spacing(lambda s: largest(s)[0] <= MOST_ADDRESSED, scene.spacing)
+        remedy = f"use a spacing of at least {best:g}" if math.isfinite(best) else "make the scene smaller"
+        raise ResourceError(
+            f"scene {scene.name!r} needs {text(needed)} for {name} with spacing {scene.spacing:g}, and kernels address no more "
+            f"than {text(MOST_ADDRESSED)} at a time on {backend.arch}; {remedy}, or use --arch cuda or cpu"
+        )
+
+
 def require_clock(scene: Scene, stepper: Any, end_time: float | None = None) -> None:
     """Raise `ResourceError` if a run of `scene` to `end_time` [s] has more ticks than 32 bits count."""
     end_time = scene.end_time if end_time is None else end_time
@@ -212,6 +248,7 @@ def require(scene: Scene, steppers: Iterable[Any], backend: Backend, *, debug: b
     for stepper in steppers:
         require_clock(scene, stepper)
     require_resolution(scene, backend.precision)
+    require_addresses(scene, steppers, backend, debug=debug)
     require_memory(scene, steppers, backend, debug=debug, pictures=pictures)
 
 

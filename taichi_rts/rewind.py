@@ -1,11 +1,15 @@
 """Setting a simulation back to its start, so that it can be timed again without being compiled again."""
 
 import copy
+import math
 from typing import Any
 
 import taichi as ti
 
+from taichi_rts.resources import MOST_ADDRESSED
 from taichi_rts.state import State
+
+WIDEST = 8  # bytes of one entry
 
 
 @ti.data_oriented
@@ -26,7 +30,7 @@ class Rewind:
             values[path][name] = copy.deepcopy(value)
         for path, owner in state.owners.items():
             self.owners.append((owner, values[path], frozenset(owner)))
-        self.copies = [_like(each) for each in self.fields]
+        self.copies = self._copies()
         self.save()
 
     def restore(self) -> None:
@@ -37,6 +41,18 @@ class Rewind:
                 del owner[late]  # hides what the class says, such as `Schedule.needs_sorting`
             owner.update(copy.deepcopy(values))
         self.grid.restored()
+
+    def _copies(self) -> list[Any]:
+        """Return a field like each, in several buffers if one would be too large for the device's addresses."""
+        copies, together = [], 0
+        for field in self.fields:
+            size = math.prod(field.shape) * getattr(field, "n", 1) * getattr(field, "m", 1) * WIDEST
+            if together + size > MOST_ADDRESSED:
+                ti.sync()  # ends the buffer
+                together = 0
+            copies.append(_like(field))
+            together += size
+        return copies
 
     @ti.kernel
     def save(self):

@@ -32,18 +32,19 @@ from taichi_rts.physics.momentum import Gravity, MomentumEquation, Pressure
 from taichi_rts.physics.moving_walls import MovingFace
 from taichi_rts.physics.obstacles import Keeper, MovingBody
 from taichi_rts.physics.sound_rule import SoundRule
+from taichi_rts.physics.timetable import Ticking
 from taichi_rts.physics.viscosity import viscosity_terms
 from taichi_rts.physics.walls import Walls
 from taichi_rts.resources import require
 from taichi_rts.sampling import Sample, sample
 from taichi_rts.scene import Scene
 from taichi_rts.solids import distance_grid, make_solid
+from taichi_rts.state import parts
 from taichi_rts.stepping.base import Stepper
 from taichi_rts.stepping.regional import Regional
 from taichi_rts.windows import FluidWindows, WallWindows
 
 REORDER_EVERY = 32  # sorts between moving the state itself into the grid's order, for locality only
-COUNTER_LIMIT = 2**30  # counts on the device are 32-bit; they are collected before they can overflow
 
 OnFrame = Callable[["Simulation"], object]
 
@@ -171,6 +172,7 @@ class Simulation:
         self._tally = Tally(self.schedule.levels)
         self._sorts = 0
         self._time = 0.0
+        self._count_in(self.timeline.tick)
         self.stop_asked: Callable[[], bool] = lambda: False
         """Asked after every step; once it is true `advance_to` raises `Interrupted`, and may be called again."""
         self._gravity_work = 0.0
@@ -189,9 +191,17 @@ class Simulation:
         )  # as the line above: so that `wall_seconds` holds no compilation
         ti.sync()
 
+    def _count_in(self, tick: float) -> None:
+        """Let all that the scene moves be counted in ticks of this length [s]."""
+        self._counted_in = tick
+        for part in parts(self, Ticking):
+            part.count_in(tick)
+
     def step(self) -> None:
         """Do what is due at the present tick: lines 4-29 of Algorithm 1."""
         now, tick = self.timeline.now, self.timeline.tick
+        if tick != self._counted_in:  # another courant, on the same kernels
+            self._count_in(tick)
         schedule = self.schedule
         with self.overhead.shared:
             if schedule.needs_sorting:
@@ -295,8 +305,6 @@ class Simulation:
         while not stopped and self.schedule.begin(self.timeline, target):
             with self.overhead.sampled_step(self.schedule.due_count):
                 self.step()
-            if (self.schedule.steps - self._tally.base_steps + 1) * self.particles.count > COUNTER_LIMIT:
-                self._collect_counts()
             stopped = self.stop_asked()
         ti.sync()
         self._tally.wall_seconds += clock.perf_counter() - began
@@ -310,7 +318,7 @@ class Simulation:
             self._tally.add(steps, self.particles.count, *self.schedule.take_counts())
 
     def _check_finite(self) -> None:
-        broken = int(self.motion.not_finite[None])
+        broken = int(self.motion.not_finite)
         if broken:
             raise SimulationDivergedError(
                 f"{broken} particle states are no longer finite at t = {self._time:g} s; "
@@ -410,10 +418,10 @@ class Simulation:
         return {
             **self._tally.statistics(),
             "overhead_fraction": self.overhead.fraction,
-            "stopped_by_domain": int(self.motion.stopped[None]),
-            "stopped_by_obstacles": int(self.motion.stopped_by_obstacles[None]),
+            "stopped_by_domain": int(self.motion.stopped),
+            "stopped_by_obstacles": int(self.motion.stopped_by_obstacles),
             **({"removed_by_outlets": list(self.outlets.removed)} if self.outlets else {}),
-            "runaways": int(self.motion.runaways[None]),
+            "runaways": int(self.motion.runaways),
             **self.schedule.statistics(),
         }
 

@@ -23,6 +23,7 @@ class State:
     Attributes:
         fields: Taichi's fields, each once, under the first path that leads to it.
         owners: the attributes of each part that may change, by the part's path.
+        parts: all parts.
 
     With `everything` also what is called transient.
     """
@@ -31,6 +32,7 @@ class State:
         self._everything = everything
         self.fields: dict[str, Any] = {}
         self.owners: dict[str, dict[str, Any]] = {}
+        self.parts: list[Any] = []
         self._skipped: dict[str, frozenset[str]] = {}
         seen: set[int] = set()
         queue = deque([("", root)])
@@ -56,11 +58,17 @@ class State:
         elif isinstance(thing, dict):
             return [(join(path, str(number)), each) for number, each in enumerate(thing.values())]
         elif is_part(thing):
+            self.parts.append(thing)
             skipped = frozenset() if self._everything else transient_names(type(thing))
             if not is_frozen(thing):
                 self.owners[path], self._skipped[path] = vars(thing), skipped
             return [(join(path, name), value) for name, value in vars(thing).items() if name not in skipped]
         return []
+
+
+def parts(root: Any, kind: type) -> list[Any]:
+    """List all parts of class `kind` that can be reached from `root`, each once."""
+    return [part for part in State(root, everything=True).parts if isinstance(part, kind)]
 
 
 def transient_names(kind: type) -> frozenset[str]:

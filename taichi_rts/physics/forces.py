@@ -80,7 +80,7 @@ class ForceMeter:
     def observe(self, now: ti.i32, tick: float):
         for k in range(self.motion.particles.alive[None]):
             for wall in ti.static(self.turning):
-                wall.observe(k, ti.cast(now, float) * tick)
+                wall.observe(k, now, tick)
 
     @ti.kernel
     def collect(self, rates: ti.types.ndarray(), places: ti.types.ndarray()):

@@ -3,12 +3,14 @@
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import taichi as ti
 
 from taichi_rts.backend import Backend
 from taichi_rts.grid import BlockGrid
 from taichi_rts.particles import Neighbourhood
 from taichi_rts.physics.medium import Medium
+from taichi_rts.physics.timetable import Timetable
 from taichi_rts.physics.walls import make_wall_sum
 from taichi_rts.scene import Scene
 from taichi_rts.windows import FluidWindows, NeighbourSum
@@ -43,7 +45,10 @@ class Gravity:
 
     def __init__(self, scene: Scene) -> None:
         self.gravity = scene.acceleration
-        self.changes = [(change.time, change.gravity) for change in scene.gravity_changes]
+        self.changes = [change.gravity for change in scene.gravity_changes]
+        if self.changes:
+            times = [change.time for change in scene.gravity_changes]
+            self.table = Timetable(times, [*np.diff(times), 1e30])
         self.dim = scene.dim
         force = scene.body_force
         self.has_body_force = force is not None
@@ -52,12 +57,12 @@ class Gravity:
             self.force_origin, self.force_value = force.base
 
     @ti.func
-    def acceleration(self, x, time):
-        """Acceleration [m/s^2], (dim,), at position `x` [m] and `time` [s]."""
+    def acceleration(self, x, now, tick):
+        """Acceleration [m/s^2], (dim,), at position `x` [m] and tick `now`."""
         total = ti.Vector(self.gravity)
-        for change in ti.static(self.changes):
-            if time >= change[0]:
-                total = ti.Vector(change[1])
+        for k in ti.static(range(len(self.changes))):
+            if self.table.since_start(k, now, tick, 0.0) >= 0.0:
+                total = ti.Vector(self.changes[k])
         if ti.static(self.has_body_force):
             for d in ti.static(range(self.dim)):
                 total[d] += self.force_value[d]
@@ -183,10 +188,10 @@ class MomentumEquation:
         """Power [W/kg] of moving walls on the particle at a place, (1,): their accelerations times their velocities."""
 
     @ti.func
-    def other_rates(self, k, fluid, time):
-        """All but the walls' share of the rates, (width,), of the particle at place `k` at `time` [s]; `fluid`: the fluid's."""
+    def other_rates(self, k, fluid, now, tick):
+        """All but the walls' share of the rates, (width,), of the particle at place `k` at tick `now`; `fluid`: the fluid's."""
         total = fluid
-        outer = self.gravity.acceleration(self.near.x[k], time)
+        outer = self.gravity.acceleration(self.near.x[k], now, tick)
         for d in ti.static(range(self.dim)):
             total[d] += outer[d]
         return total

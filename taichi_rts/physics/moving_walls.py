@@ -1,11 +1,13 @@
 """Faces of the domain that move as the scene prescribes: pistons."""
 
+import numpy as np
 import taichi as ti
 
 from taichi_rts.backend import Backend
 from taichi_rts.conditions import MovingWall, face_axis
 from taichi_rts.grid import Geometry
 from taichi_rts.particles import Neighbourhood
+from taichi_rts.physics.timetable import Timetable, store
 from taichi_rts.physics.walls import Walls
 from taichi_rts.sampling import WallLayer
 
@@ -32,27 +34,26 @@ class MovingFace(Walls):
         self.at_lower = description.face[1] == "-"
         self.face = (geometry.lower if self.at_lower else geometry.upper)[self.axis]
         times, displacements, velocities = description.times, description.displacements, description.velocities
-        self.pieces = list(zip(times, times[1:], displacements, velocities, strict=False))
-        self.end = (times[-1], displacements[-1])
         self.shift = ti.field(backend.dtype, fluid.count)
         """Displacement [m] of the frame at the time of the due particle at each place; `speed` [m/s] is its rate."""
         self.speed = ti.field(backend.dtype, fluid.count)
+        self.table = Timetable(times, [*np.diff(times), 1e30])  # the last piece is the rest after the end
+        self.displacement, self.velocity = (ti.field(backend.dtype, self.table.count) for _ in range(2))
+        store(self.displacement, np.array(displacements))
+        store(self.velocity, np.array([*velocities, 0.0]))
 
     @ti.func
-    def motion(self, time):
-        """Displacement [m] and velocity [m/s] along the axis at `time` [s]."""
-        displacement, velocity = 0.0, 0.0
-        for piece in ti.static(self.pieces):
-            if piece[0] <= time and time < piece[1]:
-                displacement, velocity = piece[2] + piece[3] * (time - piece[0]), piece[3]
-        if time >= self.end[0]:
-            displacement = self.end[1]
-        return displacement, velocity
+    def motion(self, now, tick):
+        """Displacement [m] and velocity [m/s] along the axis at tick `now`."""
+        n = self.table.piece(now, tick, 0.0)
+        ticks, rest = self.table.lasted(n, now, tick, 0.0)
+        moves = ti.cast(self.table.lasts(n, now, tick, 0.0), float)
+        return self.displacement[n] + (ti.cast(ticks, float) * tick + rest) * self.velocity[n], moves * self.velocity[n]
 
     @ti.func
-    def observe(self, k, time):
-        """Note where the wall is for the due particle at place `k`, which is at `time` [s]."""
-        self.shift[k], self.speed[k] = self.motion(time)
+    def observe(self, k, now, tick):
+        """Note where the wall is for the due particle at place `k`, which is at tick `now`."""
+        self.shift[k], self.speed[k] = self.motion(now, tick)
 
     @ti.func
     def seen_from(self, k, cell):
@@ -77,9 +78,9 @@ class MovingFace(Walls):
         return v
 
     @ti.func
-    def hold(self, x, time):
-        """Nearest point to `x` [m] that the face has not passed at `time` [s]."""
-        displacement, _velocity = self.motion(time)
+    def hold(self, x, now, tick):
+        """Nearest point to `x` [m] that the face has not passed at tick `now`."""
+        displacement, _velocity = self.motion(now, tick)
         y = x
         if ti.static(self.at_lower):
             y[self.axis] = ti.max(x[self.axis], self.face + displacement)

@@ -1,5 +1,6 @@
 """Obstacles on the device: what keeps centres out of them, and wall particles that move and turn with them."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from taichi_rts.backend import Backend
 from taichi_rts.bodies import Body
 from taichi_rts.grid import BlockGrid, Geometry
 from taichi_rts.particles import Neighbourhood
+from taichi_rts.physics.timetable import Timetable, Wheel, store
 from taichi_rts.physics.walls import Walls
 from taichi_rts.sampling import WallLayer
 from taichi_rts.solids import DistanceGrid
@@ -18,72 +20,70 @@ PROJECTIONS = 4  # of a point that is inside: the distance is not linear at edge
 
 @ti.data_oriented
 class Path:
-    """Where a moving body is, as a function of time alone: a reader at any time may ask."""
+    """Where a moving body is, as a function of time alone: a reader at any time may ask, `ahead` [s] after tick `now`."""
 
     def __init__(self, body: Body) -> None:
         pieces = body.pieces
         self.dim = dim = len(body.pivot)
-        self.count = len(pieces.starts)
+        count = len(pieces.starts)
         self.pivot = tuple(body.pivot.tolist())
         self.radius = body.radius
-        self.start, self.duration, self.top_speed = (ti.field(float, self.count) for _ in range(3))
-        self.shift, self.velocity = (ti.Vector.field(dim, float, self.count) for _ in range(2))
-        self.spin = ti.Vector.field(pieces.spins.shape[1], float, self.count)
-        self.turn = ti.Matrix.field(dim, dim, float, self.count)
-        values = (
-            pieces.starts,
-            pieces.durations,
-            body.speeds,
-            pieces.shifts,
-            pieces.velocities,
-            pieces.spins,
-            pieces.turns,
-        )
-        fields = (self.start, self.duration, self.top_speed, self.shift, self.velocity, self.spin, self.turn)
+        self.periods = body.periods
+        self.table = Timetable(pieces.starts, pieces.durations)
+        speeds = pieces.spins[:, 0] if dim == 2 else np.linalg.norm(pieces.spins, axis=1)
+        self.wheel = Wheel(speeds / (2.0 * math.pi))
+        lengths = np.array([length or math.inf for length in self.periods])
+        shifts = pieces.shifts.copy()
+        around = np.isfinite(lengths)
+        shifts[:, around] -= lengths[around] * np.rint(shifts[:, around] / lengths[around])
+        shares = pieces.velocities / lengths
+        self.rounds = [Wheel(shares[:, d]) if around[d] else None for d in range(dim)]
+        """Along periodic axes: how far the body has come, in lengths of the domain."""
+        self.top_speed = ti.field(float, count)
+        self.shift, self.velocity = (ti.Vector.field(dim, float, count) for _ in range(2))
+        self.spin = ti.Vector.field(pieces.spins.shape[1], float, count)
+        self.axis = ti.Vector.field(pieces.spins.shape[1], float, count)
+        """Direction of the angular velocity; in two dimensions the wheel knows the sign."""
+        self.turn = ti.Matrix.field(dim, dim, float, count)
+        axes = np.ones((count, 1)) if dim == 2 else pieces.spins / np.where(speeds > 0.0, speeds, 1.0)[:, None]
+        values = (body.speeds, shifts, pieces.velocities, pieces.spins, axes, pieces.turns)
+        fields = (self.top_speed, self.shift, self.velocity, self.spin, self.axis, self.turn)
         for field, value in zip(fields, values, strict=True):
-            field.from_numpy(value.astype(np.float32 if self.start.dtype == ti.f32 else np.float64))
+            store(field, value)
 
     @ti.func
-    def piece(self, time):
-        """Number of the last piece that has begun at `time` [s], of the first if none has."""
-        low, high = 0, self.count
-        while high - low > 1:
-            middle = (low + high) // 2
-            if self.start[middle] <= time:
-                low = middle
+    def pose(self, now, tick, ahead):
+        """Place of the pivot [m], along periodic axes of one of its images, and rotation."""
+        n = self.table.piece(now, tick, ahead)
+        ticks, rest = self.table.lasted(n, now, tick, ahead)
+        pivot = ti.Vector(self.pivot) + self.shift[n]
+        passed = ti.cast(ticks, float) * tick + rest
+        for d in ti.static(range(self.dim)):
+            if ti.static(self.periods[d] > 0.0):
+                pivot[d] += self.periods[d] * self.rounds[d].share(n, ticks, rest)
             else:
-                high = middle
-        return low
+                pivot[d] += passed * self.velocity[n][d]
+        return pivot, self.turned(self.axis[n], self.wheel.share(n, ticks, rest)) @ self.turn[n]
 
     @ti.func
-    def pose(self, time):
-        """Place of the pivot [m] and rotation at `time` [s]."""
-        n = self.piece(time)
-        t = ti.min(ti.max(time - self.start[n], 0.0), self.duration[n])
-        return ti.Vector(self.pivot) + self.shift[n] + t * self.velocity[n], self.turned(self.spin[n] * t) @ self.turn[
-            n
-        ]
-
-    @ti.func
-    def turned(self, angle):
-        """Matrix of a rotation [rad], as `obstacles.rotation_matrix`."""
+    def turned(self, axis, turns):
+        """Matrix of a rotation by `turns`, of which no more than half is given: sines of large angles are wrong on a GPU."""
+        angle = ti.static(2.0 * math.pi) * turns
+        c, s = ti.cos(angle), ti.sin(angle)
         result = ti.Matrix.identity(float, self.dim)
         if ti.static(self.dim == 2):
-            c, s = ti.cos(angle[0]), ti.sin(angle[0])
             result = ti.Matrix([[c, -s], [s, c]])
         else:
-            size = angle.norm()
-            if size > 0.0:
-                u = angle / size
-                cross = ti.Matrix([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
-                result += ti.sin(size) * cross + (1.0 - ti.cos(size)) * (cross @ cross)
+            u = axis
+            cross = ti.Matrix([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
+            result += s * cross + (1.0 - c) * (cross @ cross)
         return result
 
     @ti.func
-    def rates(self, time):
-        """Velocity [m/s] of the pivot and angular velocity [rad/s] at `time` [s]."""
-        n = self.piece(time)
-        moves = ti.cast(self.start[n] <= time and time < self.start[n] + self.duration[n], float)
+    def rates(self, now, tick, ahead):
+        """Velocity [m/s] of the pivot and angular velocity [rad/s]."""
+        n = self.table.piece(now, tick, ahead)
+        moves = ti.cast(self.table.lasts(n, now, tick, ahead), float)
         return moves * self.velocity[n], moves * self.spin[n]
 
     @ti.func
@@ -97,12 +97,16 @@ class Path:
         return v
 
     @ti.func
-    def speed_until(self, time, horizon):
-        """Largest speed [m/s] of the body within `horizon` [s] of `time`."""
+    def speed_until(self, now, tick, horizon):
+        """Largest speed [m/s] of the body from tick `now` on and within `horizon` [s]."""
         speed = 0.0
-        for n in range(self.count):
-            if self.start[n] < time + horizon and time < self.start[n] + self.duration[n]:
+        n = self.table.piece(now, tick, 0.0)
+        while n < self.table.count:
+            if self.table.since_start(n, now, tick, horizon) <= 0.0:
+                break
+            if self.table.since_end(n, now, tick, 0.0) < 0.0:
                 speed = ti.max(speed, self.top_speed[n])
+            n += 1
         return speed
 
 
@@ -120,7 +124,7 @@ class Keeper:
         self.scale = 1.0 / grid.step
         self.shape = grid.values.shape
         self.values = ti.field(float, self.shape)
-        self.values.from_numpy(grid.values.astype(np.float32 if self.values.dtype == ti.f32 else np.float64))
+        store(self.values, grid.values)
 
     @ti.func
     def look(self, x):
@@ -151,11 +155,14 @@ class Keeper:
         return distance, gradient
 
     @ti.func
-    def hold(self, x, time):
-        """Nearest point to `x` [m] outside the body at `time` [s], and the surface's normal and velocity [m/s] there."""
+    def hold(self, x, now, tick, ahead):
+        """Nearest point to `x` [m] outside the body, and the surface's normal and velocity [m/s] there.
+
+        It is for the time `ahead` [s] after tick `now`.
+        """
         held, normal, velocity = x, ti.zero(x), ti.zero(x)
         if ti.static(self.moves):
-            pivot, turn = self.path.pose(time)
+            pivot, turn = self.path.pose(now, tick, ahead)
             arm = self.geometry.difference(x, pivot)
             if arm.norm_sqr() < ti.static(self.path.radius**2):
                 y, n = self.outside(ti.Vector(self.path.pivot) + turn.transpose() @ arm)
@@ -163,7 +170,7 @@ class Keeper:
                     normal = turn @ n
                     new_arm = turn @ (y - ti.Vector(self.path.pivot))
                     held = x + new_arm - arm
-                    straight, spin = self.path.rates(time)
+                    straight, spin = self.path.rates(now, tick, ahead)
                     velocity = straight + self.path.carried(spin, new_arm)
         else:
             held, normal = self.outside(x)
@@ -200,11 +207,11 @@ class MovingBody(Walls):
         super().__init__(arms, fluid, Geometry(lower.tolist(), upper.tolist(), support), backend)
         self.grid = grid
         self.domain = grid.geometry
-        self.path = Path(body)
         dim, blocks = self.domain.dim, self.domain.blocks
         self.pivot, self.velocity = (ti.Vector.field(dim, float, blocks) for _ in range(2))
         self.turn = ti.Matrix.field(dim, dim, float, blocks)
         self.spin = ti.Vector.field(1 if dim == 2 else 3, float, blocks)
+        self.path = Path(body)
 
     @ti.func
     def block(self, k):
@@ -212,11 +219,11 @@ class MovingBody(Walls):
         return self.grid.block(self.grid.order[k])
 
     @ti.func
-    def observe(self, k, time):
-        """Note where the body is for the due particle at place `k`, which is at `time` [s] like all of its block."""
+    def observe(self, k, now, tick):
+        """Note where the body is for the due particle at place `k`, which is at tick `now` like all of its block."""
         n = self.block(k)
-        self.pivot[n], self.turn[n] = self.path.pose(time)
-        self.velocity[n], self.spin[n] = self.path.rates(time)
+        self.pivot[n], self.turn[n] = self.path.pose(now, tick, 0.0)
+        self.velocity[n], self.spin[n] = self.path.rates(now, tick, 0.0)
 
     @ti.func
     def seen_from(self, k, cell):

@@ -63,8 +63,8 @@ def diagnose(sim: Simulation) -> Diagnosis | None:
     ratio = rho / sim.medium.rest_density
     thin = LEAST_DENSITY / np.maximum(ratio, 1e-30)
     if (
-        not int(sim.motion.runaways[None])
-        and not int(sim.motion.not_finite[None])
+        not int(sim.motion.runaways)
+        and not int(sim.motion.not_finite)
         and np.isfinite(x).all()
         and np.isfinite(v).all()
         and (ratio <= MOST_DENSITY).all()

@@ -15,6 +15,9 @@ from taichi_rts.stepping.timeline import Timeline
 if TYPE_CHECKING:
     from taichi_rts.stepping.regional import Regional
 
+MOST_HELD = 1 << 30
+"""Particles times steps at which a block hands over what it has counted by itself; a pass adds less than that again."""
+
 
 @ti.data_oriented
 class AlignedBlocks(RegionalSchedule):
@@ -92,7 +95,7 @@ class AlignedBlocks(RegionalSchedule):
         """
         first, end = self.grid.first(block), self.grid.first(block + 1)
         level, before = self.block_level[block], self.last_level[block]
-        if level != before and self.held[block] > 0:
+        if self.held[block] > 0 and (level != before or self.held[block] >= MOST_HELD):
             self.add(self.occupancy, before, self.held[block])
             self.held[block] = 0
         self.held[block] = self.held[block] + (end - first) * passed  # `+=` would be atomic

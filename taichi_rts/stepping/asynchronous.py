@@ -20,6 +20,7 @@ from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
 from taichi_rts import backend
+from taichi_rts.counters import Counters
 from taichi_rts.errors import StepperError
 from taichi_rts.grid import BlockGrid
 from taichi_rts.integrators.serna import Serna
@@ -162,8 +163,8 @@ class AsynchronousSchedule(Cells):
         self.passes = ti.field(ti.i32, ())
         self.passes_in_cycle = ti.field(ti.i32, ())
         self.widths = ti.field(ti.i32, LOG)
-        self.wakes = ti.field(ti.i32, ())
-        self.clamped = ti.field(ti.i32, ())
+        self.wakes = Counters()
+        self.clamped = Counters()
         self.target = 0
         self.cycle_end = 1  # of the evaluation at tick 0, before which no acceleration is known
         self.cycles = 1
@@ -171,7 +172,6 @@ class AsynchronousSchedule(Cells):
         self.blind = 0
         self.reads_are_slow = backend.current().arch != "cpu"
         self.seen_widths: list[np.ndarray] = []
-        self.all_wakes = self.all_clamped = 0
 
     def retime(self, stepper: Asynchronous, timeline: Timeline) -> bool:
         """Take another courant; the number of ticks in the longest step is compiled in."""
@@ -214,7 +214,9 @@ class AsynchronousSchedule(Cells):
         self.needs_sorting = self.needs_sound = True
         self.take_counts()
         self.seen_widths.clear()
-        self.cycles, self.all_wakes, self.all_clamped = 1, 0, 0
+        self.cycles = 1
+        self.wakes.clear()
+        self.clamped.clear()
 
     def launch(self, needs_sorting: bool) -> bool:
         """Note that a pass begins.
@@ -324,7 +326,7 @@ class AsynchronousSchedule(Cells):
         if viscosity > 0.0:
             step = ti.min(step, self.viscous_reach / (viscosity * tick))
         if step < 1.0:
-            self.clamped[None] += 1
+            self.clamped.add(0, 1)
         return ti.max(1, ti.cast(ti.floor(step), ti.i32))
 
     @ti.func
@@ -404,7 +406,7 @@ class AsynchronousSchedule(Cells):
             if end < began + step:
                 self.particles.level[i] = end - began
                 woken += ti.cast(began < now, ti.i32)
-        self.wakes[None] += woken  # an atomic in the loop would end it on lavapipe
+        self.wakes.add(0, woken)  # an atomic in the loop would end it on lavapipe
 
     @ti.kernel
     def log_pass(self):
@@ -424,11 +426,7 @@ class AsynchronousSchedule(Cells):
 
     def take_counts(self) -> tuple[list[int], list[int]]:
         """Return base steps spent at each step length, and updates, since the last call."""
-        updates = self.updates.to_numpy()[1:].astype(np.int64)
-        self.updates.fill(0)
-        self.all_wakes += int(self.wakes[None])
-        self.all_clamped += int(self.clamped[None])
-        self.wakes[None] = self.clamped[None] = 0
+        updates = self.updates.take()[1:]
         self.collect_widths()
         return (updates * np.arange(1, self.levels + 1)).tolist(), updates.tolist()
 
@@ -440,7 +438,7 @@ class AsynchronousSchedule(Cells):
             "passes": len(widths),
             "cells_per_pass": {"min": int(some.min()), "median": float(np.median(some)), "max": int(some.max())},
             "cycles": self.cycles,
-            "wakes": self.all_wakes,
-            "clamped": self.all_clamped,
+            "wakes": int(self.wakes),
+            "clamped": int(self.clamped),
             "extrapolations": int(self.extrapolated[None]) if self.debug else None,
         }

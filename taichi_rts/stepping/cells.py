@@ -5,6 +5,7 @@ The rule is proved in `asynchronous.py`; this file finds the cells that obey it.
 
 import taichi as ti
 
+from taichi_rts.counters import Counters
 from taichi_rts.grid import BlockGrid
 from taichi_rts.particles import Particles
 from taichi_rts.scan import ExclusiveScan
@@ -41,7 +42,7 @@ class Cells(Schedule):
         self.youngest = ti.field(ti.i32, ())
         self.stepping = ti.field(ti.i32, ())
         self.extrapolated = ti.field(ti.i32, ())
-        self.updates = ti.field(ti.i32, levels + 1)
+        self.updates = Counters(levels + 1)
         """Updates by the ticks that had elapsed."""
 
     def find_cells(self) -> None:
@@ -171,13 +172,13 @@ class Cells(Schedule):
                         n += 1
                         if time - self.particles.updated[i] == elapsed:
                             count += 1
-                self.updates[elapsed] += count
+                self.updates.add(elapsed, count)
         for n in range(self.due_count[None]):
             i = self.grid.order[self.due[n]]
             block = self.grid.block(i)
             first = self.grid.order[self.due[self.due_start[block]]]
             if self.particles.updated[i] != self.particles.updated[first]:
-                self.updates[self.time[block] - self.particles.updated[i]] += 1
+                self.updates.add(self.time[block] - self.particles.updated[i], 1)
 
     @ti.kernel
     def mark_read(self, now: ti.i32):

@@ -68,9 +68,8 @@ class BlockMaxima:
                 if low - ti.static(self.geometry.sides[wall[0]]) < wall[2]:
                     speed2 = ti.max(speed2, wall[3] * wall[3])
         for path in ti.static(self.paths):
-            time = ti.cast(now, float) * tick
-            speed = path.speed_until(time, self.horizon)
-            pivot, _turn = path.pose(time)
+            speed = path.speed_until(now, tick, self.horizon)
+            pivot, _turn = path.pose(now, tick, 0.0)
             middle = ti.zero(pivot)
             for d in ti.static(range(self.geometry.dim)):
                 middle[d] = self.lower(block, d) + 0.5 * self.geometry.sides[d]

@@ -7,12 +7,12 @@ What all schemes share. When a block or a particle is due is the schemes' own: `
 import math
 from typing import TYPE_CHECKING
 
-import numpy as np
 import taichi as ti
 
 from taichi_rts.backend import threads
+from taichi_rts.counters import Counters
 from taichi_rts.grid import BlockGrid
-from taichi_rts.particles import Particles, Rows
+from taichi_rts.particles import Particles
 from taichi_rts.scan import ExclusiveScan
 from taichi_rts.scene import Scene
 from taichi_rts.stepping import criteria
@@ -91,8 +91,8 @@ class RegionalSchedule(Schedule):
             self.scan = ExclusiveScan(self.block_due, self.due_start)
             self.due_count = self.scan.total
         self.rows = threads() if grid.serial else 1
-        width = -(-(self.levels + 1) // 16) * 16
-        self.occupancy, self.updates = (ti.field(ti.i32, (self.rows, width)) for _ in range(2))
+        self.width = -(-(self.levels + 1) // 16) * 16
+        self.occupancy, self.updates = (Counters(self.rows * self.width, alone=grid.serial) for _ in range(2))
         """Particles and updates by level, of each thread of a CPU for itself: in one place they would wait for each other."""
 
     # -- which rules there are ----------------------------------------------------------------------------------------
@@ -270,11 +270,8 @@ class RegionalSchedule(Schedule):
     @ti.func
     def add(self, counts: ti.template(), level, count):
         """Add `count` to what is counted of `level`."""
-        if ti.static(self.grid.serial):
-            thread = ti.global_thread_idx()
-            counts[thread, level] = counts[thread, level] + count
-        else:
-            counts[0, level] += count
+        row = ti.global_thread_idx() if ti.static(self.grid.serial) else 0
+        counts.add(row * self.width + level, count)
 
     @ti.func
     def find_due_starts(self, now):
@@ -329,15 +326,6 @@ class RegionalSchedule(Schedule):
 
     def take_counts(self) -> tuple[list[int], list[int]]:
         """Return particles and updates per level since the last call."""
-        counts = np.zeros((2, self.levels + 1), np.int32)
-        self.read_counts(counts)
-        occupancy, updates = counts[:, 1:].tolist()
+        taken = (counters.take().reshape(self.rows, self.width) for counters in (self.occupancy, self.updates))
+        occupancy, updates = (counts.sum(axis=0)[1 : self.levels + 1].tolist() for counts in taken)
         return occupancy, updates
-
-    @ti.kernel
-    def read_counts(self, counts: Rows):
-        for n in range(self.levels + 1):
-            for row in range(self.rows):
-                counts[0, n] += self.occupancy[row, n]
-                counts[1, n] += self.updates[row, n]
-                self.occupancy[row, n] = self.updates[row, n] = 0

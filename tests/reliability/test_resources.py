@@ -78,3 +78,81 @@ def test_the_finest_spacing():
     scene = rts.load_scene("dam_break")
     with pytest.raises(rts.SceneError, match=f"more than the {MOST} that 32 bits count; use a spacing of at least"):
         scene.replace(spacing=1e-5)
+
+
+@pytest.fixture
+def buffers(monkeypatch):
+    """Bytes of each of Taichi's buffers, in the order in which they are made: of the fields between two launches of kernels."""
+    found, open_fields = [], []
+    make, end = ti.field, ti.lang.impl.PyTaichi.materialize_root_fb
+
+    def counted(dtype, shape, **options):
+        open_fields.append(
+            math.prod(shape if isinstance(shape, tuple) else (shape,)) * (8 if dtype in (ti.f64, ti.i64) else 4)
+        )
+        return make(dtype, shape, **options)
+
+    def vectors(kind, entries):
+        make = kind.field
+
+        def counted(*args, **options):
+            shape = args[entries + 1]
+            open_fields.append(
+                math.prod(args[:entries]) * math.prod(shape if isinstance(shape, tuple) else (shape,)) * 4
+            )
+            with monkeypatch.context() as patch:
+                patch.setattr(ti.Matrix, "field", matrix)
+                return make(*args, **options)
+
+        return counted
+
+    def ended(first):
+        if open_fields:
+            found.append(sum(open_fields))
+            open_fields.clear()
+        return end(first)
+
+    matrix = ti.Matrix.field
+    monkeypatch.setattr(ti, "field", counted)
+    monkeypatch.setattr(ti.Vector, "field", vectors(ti.Vector, 1))
+    monkeypatch.setattr(ti.Matrix, "field", vectors(ti.Matrix, 2))
+    monkeypatch.setattr(ti.lang.impl.PyTaichi, "materialize_root_fb", staticmethod(ended))
+    return found
+
+
+@pytest.mark.parametrize("name", ["dam_break", "dam_break_2d", "dam_break_obstacle", "water_jet", "projectile"])
+@pytest.mark.parametrize("stepper", [rts.Uniform(), rts.Regional(), rts.Asynchronous()], ids=lambda each: each.name)
+def test_no_buffer_of_a_graphics_device_is_larger_than_is_said(
+    name, stepper, buffers, unstarted, start_taichi, monkeypatch
+):
+    scene = rts.load_scene(name, **({"sound_speed": "regional"} if name == "projectile" else {}))
+    with start_taichi("cpu", "f32"):
+        for owner in ("backend", "grid"):
+            monkeypatch.setattr(f"taichi_rts.{owner}.on_cpu", lambda: False)
+        monkeypatch.setattr("taichi_rts.backend.current", lambda: Backend("vulkan", "f32"))
+        buffers.clear()
+        rts.Simulation(scene, stepper)
+    assert 1.0 - 1e-9 <= max(resources.buffer_bytes(scene, stepper, "f32").values()) / max(buffers) <= 1.2
+
+
+def test_a_buffer_beyond_32_bit_addresses_is_refused(monkeypatch):
+    vulkan, huge = Backend("vulkan", "f32"), rts.load_scene("dam_break", particles=90_000_000)
+    monkeypatch.setattr(resources, "free_host_memory", lambda: math.inf)
+    monkeypatch.setattr(resources, "free_device_memory", lambda backend: math.inf)
+    made = []
+    monkeypatch.setattr(ti, "field", lambda *args, **options: made.append(args))
+    monkeypatch.setattr(ti.Vector, "field", lambda *args, **options: made.append(args))
+    message = (
+        r"needs 4\.\d+ GiB for the particles' state with spacing [\d.e-]+, and kernels address no more than 4 GiB at a time on "
+        r"vulkan; use a spacing of at least [\d.e-]+, or use --arch cuda or cpu"
+    )
+    with pytest.raises(rts.Error, match=message) as caught:
+        resources.require(huge, [rts.Uniform()], vulkan)
+    assert not made
+    best = float(str(caught.value).split("at least ")[1].split(",")[0])
+    assert huge.spacing < best < 1.2 * huge.spacing
+    resources.require(huge.replace(spacing=best), [rts.Uniform()], vulkan)
+    for arch in ("cuda", "cpu"):
+        resources.require(huge, [rts.Uniform()], Backend(arch, "f32"))
+    with pytest.raises(rts.Error, match="more than 4 GiB at a time"):  # whose state is larger
+        resources.require(huge.replace(spacing=best), [rts.Asynchronous()], vulkan)

@@ -8,7 +8,9 @@ import taichi as ti
 
 import taichi_rts as rts
 from taichi_rts.bodies import bodies
+from taichi_rts.physics.timetable import Ticking
 from taichi_rts.solids import make_solid
+from taichi_rts.state import parts
 from taichi_rts.stepping.limits import BlockMaxima
 
 MESHES = Path(__file__).parents[2] / "assets" / "obstacles"
@@ -122,6 +124,8 @@ def test_blocks_know_the_speed_of_a_body_before_it_arrives(simulate, unstarted):
     scene = rts.Scene(UNIT, (rts.Block((0, 0), (1, 0.2)),), 0.025, sound_speed=50.0, obstacles=(disc,))
     sim = simulate(scene, rts.Uniform())
     look = Look(BlockMaxima(scene, sim.particles, sim.grid))
+    for part in parts(look.maxima, Ticking):
+        part.count_in(1e-4)
     x = scene.support * (0.5 + np.arange(-1, 22))  # middles of a row of blocks at y = 0.475
     row = slice(10 * 23, 11 * 23)
 

@@ -1,0 +1,54 @@
+"""Counts that do not overflow, also where a device only has 32-bit integers."""
+
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+
+@ti.data_oriented
+class Counters:
+    """Counts of up to 2^64 - 1, each in two fields of 32 bits: its lower half, and how often that has run over.
+
+    With `alone` no two threads ever add to the same entry, so that additions need not be atomic.
+    """
+
+    def __init__(self, count: int = 1, *, alone: bool = False) -> None:
+        self.alone = alone
+        self.low, self.high = (ti.field(ti.u32, count) for _ in range(2))
+
+    @ti.func
+    def add(self, entry, count):
+        """Add `count`, which is not negative and at most 2^32 - 1, to an entry."""
+        more = ti.cast(count, ti.u32)
+        if ti.static(self.alone):
+            before = self.low[entry]
+            self.low[entry] = before + more
+            if before + more < before:
+                self.high[entry] = self.high[entry] + ti.u32(1)
+        else:
+            before = ti.atomic_add(self.low[entry], more)
+            if before + more < before:
+                ti.atomic_add(self.high[entry], ti.u32(1))
+
+    def values(self) -> np.ndarray:
+        """Return the counts as 64-bit integers, (count,)."""
+        low, high = (field.to_numpy().astype(np.int64) for field in (self.low, self.high))
+        return low + (high << 32)
+
+    def take(self) -> np.ndarray:
+        """Return the counts and begin with 0 again."""
+        found = self.values()
+        self.clear()
+        return found
+
+    def clear(self) -> None:
+        """Begin with 0 again."""
+        self.low.fill(0)
+        self.high.fill(0)
+
+    def __int__(self) -> int:
+        """Return the first count, where there is one only; it reads two numbers of the device."""
+        fields: tuple[Any, Any] = (self.low, self.high)
+        low, high = (int(field[0]) & 0xFFFFFFFF for field in fields)
+        return low + (high << 32)
