@@ -61,6 +61,7 @@ def write(
     runs: list[dict[str, Any]] = []
     arrays: dict[str, np.ndarray] = {}
     for number, sim in enumerate(sims):
+        sim.taichi_start.require("this simulation")
         state = State(sim)
         values: dict[str, dict[str, Any]] = {owner: {} for owner in state.owners}
         for owner, name, value in state.values():
