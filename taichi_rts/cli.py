@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import gc
 import json
 import sys
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
 
 import taichi_rts as rts
-from taichi_rts import backend, report
+from taichi_rts import backend, importing, report
 from taichi_rts.benchmarks.command import Bench
 from taichi_rts.compare.command import Compare
 from taichi_rts.errors import CheckpointError, Error, OutputError
@@ -31,6 +33,7 @@ from taichi_rts.output.resume import (
 )
 from taichi_rts.output.side_by_side import SideBySide
 from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
+from taichi_rts.plain_text import use_plain_text
 from taichi_rts.rendering.painter import Mode, PictureOptions, View, make_cameras
 from taichi_rts.stability.command import Stability
 from taichi_rts.stepping.steppers import STEPPERS
@@ -320,12 +323,14 @@ def check_angles(azimuth: float | None, elevation: float | None) -> None:
 
 def main(args: list[str] | None = None) -> None:
     """Entry point of `taichi-rts`."""
-    _execute(tyro.cli(Command, prog="taichi-rts", description=rts.__doc__, args=args))  # type: ignore[arg-type]
+    with _program():
+        _execute(tyro.cli(Command, prog="taichi-rts", description=rts.__doc__, args=args))  # type: ignore[arg-type]
 
 
 def run_demo(scene: str, **defaults: Any) -> None:
     """Run a demo: `taichi-rts run SCENE` with other defaults; takes the same options."""
-    _execute(parse_demo(Run(scene=scene, **{"output_dir": Path("out") / scene} | defaults)))
+    with _program():
+        _execute(parse_demo(Run(scene=scene, **{"output_dir": Path("out") / scene} | defaults)))
 
 
 def parse_demo(default: Run, args: list[str] | None = None) -> Run:
@@ -336,16 +341,24 @@ def parse_demo(default: Run, args: list[str] | None = None) -> Run:
     return run
 
 
+@contextlib.contextmanager
+def _program() -> Iterator[None]:
+    """What is said, and with which exit code, when the package runs as a program."""
+    use_plain_text()
+    try:
+        importing.done()
+        yield
+    except Error as error:
+        print(f"taichi-rts: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+    except KeyboardInterrupt as stop:
+        said = str(stop) or "interrupted; what is written already is whole"
+        print(f"taichi-rts: {said}", file=sys.stderr)
+        raise SystemExit(getattr(stop, "exit_code", 130)) from None
+
+
 def _execute(command: Any) -> None:
     gc.set_threshold(50_000)  # building kernels makes much garbage of which none goes round in circles: 0.15 s of 4.3
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_: print(f"taichi-rts: warning: {message}", file=sys.stderr)
-        try:
-            command()
-        except Error as error:
-            print(f"taichi-rts: {error}", file=sys.stderr)
-            raise SystemExit(2) from None
-        except KeyboardInterrupt as stop:
-            said = str(stop) or "interrupted; what is written already is whole"
-            print(f"taichi-rts: {said}", file=sys.stderr)
-            raise SystemExit(getattr(stop, "exit_code", 130)) from None
+        command()
