@@ -35,6 +35,7 @@ from taichi_rts.output.side_by_side import SideBySide
 from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
 from taichi_rts.plain_text import use_plain_text
 from taichi_rts.rendering.painter import Mode, PictureOptions, View, make_cameras
+from taichi_rts.scene_size import warn_of_size
 from taichi_rts.stability.command import Stability
 from taichi_rts.stepping.steppers import STEPPERS
 
@@ -44,7 +45,8 @@ class Run:
     """Run a scene and save its frames.
 
     Writes OUTPUT_DIR/frames/000000.png ... at exact physical times, and OUTPUT_DIR/run.json. Exit codes: 0 done, 2 wrong
-    input or nothing to run on, 130 or 143 interrupted by Ctrl-C or SIGTERM: then `--resume OUTPUT_DIR` goes on.
+    input or nothing to run on, 3 with --strict if the table marks a run red, 130 or 143 interrupted by Ctrl-C or SIGTERM:
+    then `--resume OUTPUT_DIR` goes on.
     """
 
     scene: tyro.conf.Positional[str | None] = None
@@ -133,6 +135,8 @@ class Run:
     """Also write particles at each frame, in any of vtu, ply, npz, bgeo, vtkhdf, and the water's surface (docs/files.md)."""
     attributes: tuple[str, ...] = DEFAULT_ATTRIBUTES
     """What files say of each particle: any of id, velocity, density, pressure, level, step, cell_time, sound_speed, fluid."""
+    strict: bool = False
+    """Exit with 3 if a run has blown up or was not weakly compressible: what the table marks red."""
     debug: bool = False
     """Check at run time what steppers promise (nobody is extrapolated, somebody steps in every pass); adds up momentum."""
     gui: bool = False
@@ -188,6 +192,7 @@ class Run:
             checkpoint_every=self.checkpoint_every,
             command=command_data(self),
         )
+        warn_of_size(scene)
         recording.exporter(scene.dim)  # here, so that what is wrong is said before anything starts
         frames = len(frame_times(scene.end_time, self.export_fps))
         check_size(self.width, self.height)
@@ -212,6 +217,14 @@ class Run:
                 sim, recorder.initial_energy[stepper], diagnoses.found.get(stepper), extremes.facts(stepper)
             )
         report.print_folder(folder, frames, recorder.files())
+        bad = [
+            stepper.name
+            for stepper in recorder.runs
+            if not extremes.is_weakly_compressible(stepper) or stepper in diagnoses.found
+        ]
+        if self.strict and bad:
+            print(f"taichi-rts: --strict: the table marks {', '.join(bad)} steps red", file=sys.stderr)
+            raise SystemExit(3)
 
     def go_on(self, path: Path) -> None:
         """Go on from a checkpoint; what this command says besides must not contradict it."""
@@ -260,7 +273,7 @@ class Run:
 STEPPER_OPTIONS = sorted({key for kind in STEPPERS.values() for key in kind.__dataclass_fields__} & set(vars(Run)))
 """Options of `Run` that are some stepper's parameters."""
 NOT_IN_WINDOW = (
-    *("panels", "debug", "resume", "checkpoint_every", "frames", "video", "gif", "export", "attributes"),
+    *("panels", "debug", "strict", "resume", "checkpoint_every", "frames", "video", "gif", "export", "attributes"),
     *("views", "quality", "transparent"),
 )
 """Options of `Run` that a window cannot obey. `export_fps` and `overwrite` say nothing there, but demos set the first."""

@@ -20,7 +20,7 @@ from taichi_rts.stepping.steppers import stepper_data
 
 FOLDER = "checkpoints"
 SCENE_OPTIONS = {"scene", "spacing", "particles", "sound_speed"}
-FOR_THIS_COMMAND = {"resume", "overwrite", "output_dir", "gui"}
+FOR_THIS_COMMAND = {"resume", "overwrite", "output_dir", "gui", "strict"}
 """Options that a run that goes on does not take over from the one that wrote the checkpoint."""
 
 
