@@ -1,5 +1,6 @@
 """Spatially varying time stepping for weakly compressible SPH, on Taichi. Importing starts nothing; call `init`."""
 
+from taichi_rts import importing  # noqa: F401  first, as Ctrl-C may come while the others are imported
 from taichi_rts.backend import init
 from taichi_rts.conditions import GravityChange, Inflow, MovingWall, Outlet
 from taichi_rts.diagnostics import Energy

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import gc
 import json
 import sys
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
 
 import taichi_rts as rts
-from taichi_rts import backend, report
+from taichi_rts import backend, importing, report
 from taichi_rts.benchmarks.command import Bench
 from taichi_rts.compare.command import Compare
 from taichi_rts.errors import CheckpointError, Error, OutputError
@@ -31,7 +33,9 @@ from taichi_rts.output.resume import (
 )
 from taichi_rts.output.side_by_side import SideBySide
 from taichi_rts.panels import DEFAULT_LAYOUT, LAYOUTS, Panel
+from taichi_rts.plain_text import use_plain_text
 from taichi_rts.rendering.painter import Mode, PictureOptions, View, make_cameras
+from taichi_rts.scene_size import warn_of_size
 from taichi_rts.stability.command import Stability
 from taichi_rts.stepping.steppers import STEPPERS
 
@@ -41,7 +45,8 @@ class Run:
     """Run a scene and save its frames.
 
     Writes OUTPUT_DIR/frames/000000.png ... at exact physical times, and OUTPUT_DIR/run.json. Exit codes: 0 done, 2 wrong
-    input or nothing to run on, 130 or 143 interrupted by Ctrl-C or SIGTERM: then `--resume OUTPUT_DIR` goes on.
+    input or nothing to run on, 3 with --strict if the table marks a run red, 130 or 143 interrupted by Ctrl-C or SIGTERM:
+    then `--resume OUTPUT_DIR` goes on.
     """
 
     scene: tyro.conf.Positional[str | None] = None
@@ -130,6 +135,8 @@ class Run:
     """Also write particles at each frame, in any of vtu, ply, npz, bgeo, vtkhdf, and the water's surface (docs/files.md)."""
     attributes: tuple[str, ...] = DEFAULT_ATTRIBUTES
     """What files say of each particle: any of id, velocity, density, pressure, level, step, cell_time, sound_speed, fluid."""
+    strict: bool = False
+    """Exit with 3 if a run has blown up or was not weakly compressible: what the table marks red."""
     debug: bool = False
     """Check at run time what steppers promise (nobody is extrapolated, somebody steps in every pass); adds up momentum."""
     gui: bool = False
@@ -185,6 +192,7 @@ class Run:
             checkpoint_every=self.checkpoint_every,
             command=command_data(self),
         )
+        warn_of_size(scene)
         recording.exporter(scene.dim)  # here, so that what is wrong is said before anything starts
         frames = len(frame_times(scene.end_time, self.export_fps))
         check_size(self.width, self.height)
@@ -209,6 +217,14 @@ class Run:
                 sim, recorder.initial_energy[stepper], diagnoses.found.get(stepper), extremes.facts(stepper)
             )
         report.print_folder(folder, frames, recorder.files())
+        bad = [
+            stepper.name
+            for stepper in recorder.runs
+            if not extremes.is_weakly_compressible(stepper) or stepper in diagnoses.found
+        ]
+        if self.strict and bad:
+            print(f"taichi-rts: --strict: the table marks {', '.join(bad)} steps red", file=sys.stderr)
+            raise SystemExit(3)
 
     def go_on(self, path: Path) -> None:
         """Go on from a checkpoint; what this command says besides must not contradict it."""
@@ -257,7 +273,7 @@ class Run:
 STEPPER_OPTIONS = sorted({key for kind in STEPPERS.values() for key in kind.__dataclass_fields__} & set(vars(Run)))
 """Options of `Run` that are some stepper's parameters."""
 NOT_IN_WINDOW = (
-    *("panels", "debug", "resume", "checkpoint_every", "frames", "video", "gif", "export", "attributes"),
+    *("panels", "debug", "strict", "resume", "checkpoint_every", "frames", "video", "gif", "export", "attributes"),
     *("views", "quality", "transparent"),
 )
 """Options of `Run` that a window cannot obey. `export_fps` and `overwrite` say nothing there, but demos set the first."""
@@ -320,12 +336,14 @@ def check_angles(azimuth: float | None, elevation: float | None) -> None:
 
 def main(args: list[str] | None = None) -> None:
     """Entry point of `taichi-rts`."""
-    _execute(tyro.cli(Command, prog="taichi-rts", description=rts.__doc__, args=args))  # type: ignore[arg-type]
+    with _program():
+        _execute(tyro.cli(Command, prog="taichi-rts", description=rts.__doc__, args=args))  # type: ignore[arg-type]
 
 
 def run_demo(scene: str, **defaults: Any) -> None:
     """Run a demo: `taichi-rts run SCENE` with other defaults; takes the same options."""
-    _execute(parse_demo(Run(scene=scene, **{"output_dir": Path("out") / scene} | defaults)))
+    with _program():
+        _execute(parse_demo(Run(scene=scene, **{"output_dir": Path("out") / scene} | defaults)))
 
 
 def parse_demo(default: Run, args: list[str] | None = None) -> Run:
@@ -336,16 +354,24 @@ def parse_demo(default: Run, args: list[str] | None = None) -> Run:
     return run
 
 
+@contextlib.contextmanager
+def _program() -> Iterator[None]:
+    """What is said, and with which exit code, when the package runs as a program."""
+    use_plain_text()
+    try:
+        importing.done()
+        yield
+    except Error as error:
+        print(f"taichi-rts: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+    except KeyboardInterrupt as stop:
+        said = str(stop) or "interrupted; what is written already is whole"
+        print(f"taichi-rts: {said}", file=sys.stderr)
+        raise SystemExit(getattr(stop, "exit_code", 130)) from None
+
+
 def _execute(command: Any) -> None:
     gc.set_threshold(50_000)  # building kernels makes much garbage of which none goes round in circles: 0.15 s of 4.3
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_: print(f"taichi-rts: warning: {message}", file=sys.stderr)
-        try:
-            command()
-        except Error as error:
-            print(f"taichi-rts: {error}", file=sys.stderr)
-            raise SystemExit(2) from None
-        except KeyboardInterrupt as stop:
-            said = str(stop) or "interrupted; what is written already is whole"
-            print(f"taichi-rts: {said}", file=sys.stderr)
-            raise SystemExit(getattr(stop, "exit_code", 130)) from None
+        command()

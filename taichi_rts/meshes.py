@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.errors import SceneError
-from taichi_rts.obstacles import MeshObstacle
+from taichi_rts.obstacles import MeshObstacle, changed_mesh
 from taichi_rts.rotations import rotation_matrix
 from taichi_rts.solids import DistanceGrid, Solid, grid_nodes
 
@@ -31,9 +32,12 @@ def load_mesh(obstacle: MeshObstacle) -> Any:
         raise SceneError(
             f"mesh file {obstacle.file!r} cannot be read without {error.name}; install it: pip install 'taichi_rts[mesh]'"
         ) from None
+    content = path.read_bytes()
+    if obstacle.sha256 not in (None, hashlib.sha256(content).hexdigest()):
+        raise SceneError(changed_mesh(obstacle.file, str(obstacle.sha256)) + ", or load the scene again")
     try:
         # From bytes: a material library or a texture that the file names is never looked for.
-        mesh = trimesh.load_mesh(io.BytesIO(path.read_bytes()), file_type=path.suffix[1:].lower(), process=True)
+        mesh = trimesh.load_mesh(io.BytesIO(content), file_type=path.suffix[1:].lower(), process=True)
     except Exception as error:  # readers raise anything for a file that is not what its name says
         raise SceneError(f"mesh file {obstacle.file!r} cannot be read: {error}; export it again") from None
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -262,6 +263,7 @@ class MeshObstacle:
         rotation: [degrees] about the file's origin, after scaling.
         translation: [m], (3,), after turning.
         motion: how it moves; None: not at all.
+        sha256: what the content of the file must be, as `Scene.to_dict` says it; None: anything.
         shape: "mesh", as a scene file has it.
     """
 
@@ -270,8 +272,38 @@ class MeshObstacle:
     rotation: Turn | None = None
     translation: Annotated[tuple[Number, ...], Len(3, 3)] = (0.0, 0.0, 0.0)
     motion: Motion | None = None
+    sha256: str | None = None
     shape: Literal["mesh"] = "mesh"
     dim = 3
+
+    @model_validator(mode="after")
+    def _take_digest(self) -> MeshObstacle:
+        """Know the mesh by its content: a file that is edited later is another obstacle."""
+        digest = file_digest(self.file)
+        if self.sha256 is None:
+            object.__setattr__(self, "sha256", digest)
+        elif digest not in (None, self.sha256):
+            raise ValueError(changed_mesh(self.file, self.sha256))
+        return self
+
+
+def file_digest(file: str) -> str | None:
+    """SHA-256 of a file's content; None if it cannot be read."""
+    try:
+        with open(file, "rb") as content:
+            found = hashlib.sha256()
+            while chunk := content.read(1 << 20):
+                found.update(chunk)
+            return found.hexdigest()
+    except (OSError, ValueError):  # a zero byte in a path is no OSError
+        return None
+
+
+def changed_mesh(file: str, sha256: str) -> str:
+    """Say that a mesh is not what it was."""
+    return (
+        f"mesh file {file!r} has changed: its content is not that of sha256 {sha256[:12]}...; put the earlier file back"
+    )
 
 
 SHAPES = {

@@ -23,6 +23,8 @@ from taichi_rts.stability.diagnosis import Diagnosis
 
 NOTABLE_GAIN = 0.01
 """Share of its energy that a run may gain without a word, as in the conformance tests."""
+LITTLE_ENERGY = 1e-4
+"""Share of what could move below which the energy at the start is next to none, so that no change is a share of it."""
 
 console = Console()
 
@@ -79,7 +81,8 @@ def print_table(
 
     energy = sim.energy()
     work = sim.work() if sim.keeps_work else 0.0
-    drift = (energy.total - work - initial_energy.total) / abs(initial_energy.total) if initial_energy.total else 0.0
+    gain, scale = energy.total - work - initial_energy.total, energy_scale(sim)
+    drift = gain / abs(initial_energy.total) if initial_energy.total else 0.0
     facts = Table(show_header=False, box=None)
     active, base_steps = statistics["active_fraction"], statistics["base_steps"]
     facts.add_row("active fraction", f"{active:.3f}")
@@ -101,10 +104,12 @@ def print_table(
         facts.add_row("momentum drift", f"{share:.1e} of the mass times the largest speed")
     if statistics.get("extrapolations") is not None:
         facts.add_row("extrapolations", str(statistics["extrapolations"]))
-    facts.add_row(
-        "energy " + ("gained" if drift > 0.0 else "dissipated"),
-        energy_fact(drift, initial_energy, known=sim.keeps_work),
-    )
+    fact = energy_fact(drift, initial_energy, known=sim.keeps_work)
+    if (
+        abs(initial_energy.total) < LITTLE_ENERGY * scale
+    ):  # nothing that is worth a share of it moves at the start, or could fall
+        fact = f"{abs(gain):.3g} J; at the start there was next to none"
+    facts.add_row("energy " + ("gained" if gain > 0.0 else "dissipated"), fact)
     if work:
         facts.add_row("work put in", f"{work:+.4g} J, counted apart")
     if not sim.keeps_work:
@@ -126,6 +131,11 @@ def print_table(
     console.print(facts)
     if diagnosis is not None:
         print_diagnosis(diagnosis)
+
+
+def energy_scale(sim: Simulation) -> float:
+    """Kinetic energy [J] that all fluid has at a tenth of the sound speed: what the sound speed expects to move."""
+    return 0.5 * sim.medium.mass * sim.count * (0.1 * sim.medium.sound_speed) ** 2
 
 
 def energy_fact(drift: float, initial: Energy, *, known: bool = True) -> str:

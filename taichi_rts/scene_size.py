@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -90,3 +91,18 @@ def size_faults(scene: Scene) -> list[str]:
         f"spacing: {scene.spacing:g} makes {found[name]:.3g} {name}, more than the {MOST} that 32 bits count; "
         f"use a spacing of at least {best:g}, or a smaller scene"
     ]
+
+
+HUGE = 300.0
+"""Extent [m] from which a domain looks as if its numbers were millimetres."""
+
+
+def warn_of_size(scene: Scene) -> None:
+    """Warn of a domain that was perhaps drawn in millimetres: nothing else says so, as all of a run follows from its lengths."""
+    extent = max(scene.domain.size)
+    if extent >= HUGE and any(scene.acceleration):
+        warnings.warn(
+            f"the domain of {scene.name!r} is {extent:g} m across, and lengths are metres; if it was drawn in millimetres, "
+            f"divide all its lengths by 1000 (that is {extent / 1000:g} m)",
+            stacklevel=2,
+        )

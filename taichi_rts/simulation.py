@@ -22,6 +22,7 @@ from taichi_rts.grid import BlockGrid, Geometry
 from taichi_rts.inflow import Inflows
 from taichi_rts.motion import Motion
 from taichi_rts.outlet import Outlets
+from taichi_rts.ownership import guarded
 from taichi_rts.particles import Neighbourhood, Particles
 from taichi_rts.physics.continuity import ContinuityDensity, DensityDiffusion, MirroredPressure
 from taichi_rts.physics.density import SummationDensity
@@ -77,18 +78,21 @@ def make_keepers(scene: Scene, geometry: Geometry) -> list[Keeper]:
     return [Keeper(distance_grid(solid, scene.spacing), geometry, moving.get(k)) for k, solid in enumerate(solids)]
 
 
+@guarded("time", "count", "removed_count", "keeps_work", "keeps_momentum_budget")
 class Simulation:
     """A scene, a stepper, and the state in between.
 
-    Call `taichi_rts.init` first. Building one compiles its kernels and evaluates the first forces. With `debug` the stepper
+    Call `taichi_rts.init` first, in the same thread; it may run in any. Another `init` ends it: what is then asked of it raises
+    `BackendError`. Building one compiles its kernels and evaluates the first forces. With `debug` the stepper
     checks at every step what is true by construction, and raises `AssertionError` where it is not; and the walls' impulse is
     added up.
     """
 
-    transient = frozenset({"_fluids"})
+    transient = frozenset({"_fluids", "taichi_start"})
 
     def __init__(self, scene: Scene, stepper: Stepper | None = None, *, debug: bool = False) -> None:
         backend = backends.current()
+        self.taichi_start = backends.start_for_fields()
         self.stepper = stepper if stepper is not None else cast(Stepper, Regional())
         self.scene = scene = scene.with_sound_for(self.stepper)
         self.backend = backend
@@ -476,6 +480,7 @@ class Simulation:
         if not self.scene.obstacles:
             raise Error(f"scene {self.scene.name!r} has 0 obstacles, so no force acts on one; give it at least 1")
         if self._meter is None:
+            self.taichi_start.require_thread()
             self._meter = ForceMeter(self.scene, self.motion, self._obstacle_layers, self.walls, self.backend)
         return self._meter.measure(self.medium.mass, self.timeline.now, self.timeline.tick)
 

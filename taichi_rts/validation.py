@@ -41,6 +41,8 @@ UNITS = {
     **{"kg/m^3": 1.0, "g/cm^3": 1e3, "kg/l": 1e3, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "deg": 1.0, "°": 1.0},
 }
 """Units that people write behind numbers, in SI units (angles in degrees): only to say what to write instead."""
+LONG_LIST = re.compile(r"[(\[](?:[-+\w.]+|[(\[][^()\[\]]*[)\]])(?:, (?:[-+\w.]+|[(\[][^()\[\]]*[)\]])){8,}[)\]]")
+"""A list of numbers, or of lists of numbers, with more than eight entries, as Python writes it."""
 QUANTITY = re.compile(r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)\s*([^\d\s.][^\s]*)")
 
 
@@ -111,8 +113,19 @@ def describe(error: pydantic.ValidationError, subject: str, names: Iterable[str]
         elif item["type"] not in ("value_error", "assertion_error"):
             given = repr(item["input"])
             message = f"{message} (got {given if len(given) <= MOST_SHOWN else given[: MOST_SHOWN - 3] + '...'})"
+        message = with_short_lists(message)
         lines.append(f"{path}: {message}" if path else message)
     return f"{subject}: " + "\n  ".join(lines)
+
+
+def with_short_lists(message: str) -> str:
+    """Return `message` with the first three and the last entry of each long list, and how many there are."""
+
+    def shorten(found: re.Match[str]) -> str:
+        entries = re.findall(r"[-+\w.]+|[(\[][^()\[\]]*[)\]]", found[0][1:-1])
+        return f"{found[0][0]}{', '.join(entries[:3])}, ..., {entries[-1]}{found[0][-1]} ({len(entries)} entries)"
+
+    return LONG_LIST.sub(shorten, message)
 
 
 def in_si(text: str) -> float | None:

@@ -92,7 +92,7 @@ def simulate(kernel_cache):
     """
 
     def build(*args, **options):
-        rts.init("cpu", "f64", **QUICK)
+        rts.init("cpu", "f64", restart=True, **QUICK)
         return rts.Simulation(*args, **options)
 
     yield build

@@ -57,7 +57,7 @@ class Settings:
     def start(self) -> None:
         """Begin anew, with an empty device."""
         gc.collect()
-        rts.init(self.arch)
+        rts.init(self.arch, restart=True)
 
     def particles(self, count: int) -> int:
         """Scaled number of particles."""
@@ -276,7 +276,7 @@ def profile(settings: Settings) -> Iterator[Row]:
     """Time of each kernel of a uniform and of a regional run."""
     for name, stepper in (("uniform", rts.Uniform(0.4)), ("regional", rts.Regional(preset="paper"))):
         gc.collect()
-        rts.init(settings.arch, kernel_profiler=True)
+        rts.init(settings.arch, restart=True, kernel_profiler=True)
         sim = rts.Simulation(peers_dam_break(settings.cells(60)), stepper)
         timing.pace(sim, 20)
         ti.profiler.clear_kernel_profiler_info()

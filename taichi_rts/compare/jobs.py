@@ -73,7 +73,7 @@ def run(job: Job) -> Outcome:
     The wall time is the median over all of them. Every one is warm: building a `Simulation` compiles its kernels and takes a
     first step, and a repeat starts from the same object, rewound.
     """
-    device = rts.init(job.arch, job.precision, unrolling_limit=0)  # `Rewind` unrolls over all fields
+    device = rts.init(job.arch, job.precision, restart=True, unrolling_limit=0)  # `Rewind` unrolls over all fields
     scene = scene_from(job.scene)
     reset_peak_memory()
     follower = _Follower(job)
@@ -150,7 +150,7 @@ def find_largest_stable(job: Job) -> dict[str, Any]:
     bracket = largest_stable(
         scene_from(job.scene),
         lambda courant: cast(Stepper, rts.Uniform(courant=courant)),
-        fresh=lambda: rts.init(job.arch, job.precision),
+        fresh=lambda: rts.init(job.arch, job.precision, restart=True),
         run=partial(watch, demanded_density=job.demanded_density, times=job.times),
     )
     return {"stable": bracket.stable, "unstable": bracket.unstable, "reason": bracket.reason}

@@ -18,9 +18,10 @@ import taichi as ti
 
 from taichi_rts import backend
 from taichi_rts.errors import CheckpointError, Error
+from taichi_rts.obstacles import changed_mesh, file_digest
 from taichi_rts.output.archive import Archive, open_archive, write_archive
 from taichi_rts.scene import Scene, scene_from
-from taichi_rts.scene_files.reading import require_files_near
+from taichi_rts.scene_files.reading import moved_along, parts_with_files, places_beside, require_files_near
 from taichi_rts.simulation import Simulation
 from taichi_rts.state import State
 from taichi_rts.stepping.steppers import stepper_data, stepper_from
@@ -61,6 +62,7 @@ def write(
     runs: list[dict[str, Any]] = []
     arrays: dict[str, np.ndarray] = {}
     for number, sim in enumerate(sims):
+        sim.taichi_start.require("this simulation")
         state = State(sim)
         values: dict[str, dict[str, Any]] = {owner: {} for owner in state.owners}
         for owner, name, value in state.values():
@@ -70,6 +72,9 @@ def write(
         runs.append({"scene": scene, "stepper": stepper, "debug": sim.schedule.debug, "time": sim.time})
         runs[-1] |= {"fields": list(state.fields), "values": values}
     device = sims[0].backend
+    files: dict[str, str] = {}
+    for data in runs:
+        files |= places_beside(data["scene"], path.parent)
     header = {
         "format": FORMAT,
         "version": version("taichi_rts"),
@@ -77,6 +82,7 @@ def write(
         "arch": device.arch,
         "precision": device.precision,
         "extra": dict(extra or {}),
+        "files": files,
         "runs": runs,
     }
     write_archive(path, header, arrays, temporary)
@@ -105,14 +111,25 @@ class Checkpoint:
             self.steppers = [stepper_from(run["stepper"]) for run in self.runs]
             source = f"scene of {archive.path}"
             for data in (*(run["scene"] for run in self.runs), self.extra.get("scene", {})):
+                moved_along(data, dict(header.get("files", {})), archive.path.parent)
                 require_files_near(data, archive.path, source)
+                self._require_meshes(data)
             self.scenes = [scene_from(run["scene"], source) for run in self.runs]
             self.debug = bool(self.runs[0]["debug"])
             self.time = min(float(run["time"]) for run in self.runs)
             if not 0.0 <= self.time < math.inf:
                 raise ValueError(f"time {self.time} is none")
+        except CheckpointError:
+            raise
         except (AttributeError, LookupError, TypeError, ValueError) as error:
             raise archive.error(f"has a header that cannot be used: {error}") from None
+
+    def _require_meshes(self, data: Mapping[str, Any]) -> None:
+        """Raise `CheckpointError` for a mesh that is not there any more, or has another content than it had."""
+        for place, part in parts_with_files(data):
+            if part.get("shape") == "mesh" and (digest := file_digest(part["file"])) != part.get("sha256", digest):
+                what = changed_mesh(part["file"], part["sha256"]) if digest else f"mesh file {part['file']!r} is gone"
+                raise CheckpointError(f"{self.archive.path}: {place}: {what}, or start a new run")
 
     def simulation(self, run: int, scene: Scene | None = None) -> Simulation:
         """Build simulation number `run` in its present state; `scene`, if given, differs from its own in nothing that counts."""

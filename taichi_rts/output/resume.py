@@ -15,11 +15,12 @@ from taichi_rts.output.archive import open_archive
 from taichi_rts.output.checkpoint import Checkpoint, differences
 from taichi_rts.panels import Panel
 from taichi_rts.scene import Scene, scene_from
+from taichi_rts.scene_files.reading import parts_with_files
 from taichi_rts.stepping.steppers import stepper_data
 
 FOLDER = "checkpoints"
 SCENE_OPTIONS = {"scene", "spacing", "particles", "sound_speed"}
-FOR_THIS_COMMAND = {"resume", "overwrite", "output_dir", "gui"}
+FOR_THIS_COMMAND = {"resume", "overwrite", "output_dir", "gui", "strict"}
 """Options that a run that goes on does not take over from the one that wrote the checkpoint."""
 
 
@@ -78,7 +79,7 @@ def resumed_scene(checkpoint: Checkpoint, given: Scene | None, end_time: float |
     scene = scene_from(kept, f"scene of {path}") if kept else checkpoint.scenes[0]
     if given is not None:
         end_time = end_time or given.end_time
-        if found := differences(scene.to_dict(), given.replace(end_time=scene.end_time).to_dict()):
+        if found := scene_differences(scene, given.replace(end_time=scene.end_time)):
             raise CheckpointError(f"{path} is of another scene: {found}; leave it out, or start a new run")
     if end_time is not None and end_time != scene.end_time:
         if any(inflow.stop is None for inflow in scene.inflows):
@@ -90,6 +91,20 @@ def resumed_scene(checkpoint: Checkpoint, given: Scene | None, end_time: float |
         except SceneError as error:
             raise CheckpointError(f"--end-time: {error}") from None
     return scene
+
+
+def scene_differences(there: Scene, here: Scene) -> str:
+    """Say in what two scenes differ, as `differences` does; files are the same if their content is, wherever they lie."""
+    found = []
+    for data in (there.to_dict(), here.to_dict()):
+        for _, part in parts_with_files(data):
+            if part.get("sha256"):
+                part["file"] = f"{Path(part['file']).name} of sha256 {part['sha256'][:12]}"
+        found.append(data)
+    for (place, one), (other_place, other) in zip(*map(parts_with_files, found), strict=False):
+        if place == other_place and one.get("sha256") != other.get("sha256"):
+            return f"{place}.file {one['file']} there and {other['file']} here"
+    return differences(*found)
 
 
 def require_same(checkpoint: Checkpoint, steppers: Sequence[Any], settings: dict[str, tuple[Any, Any]]) -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import re
 import sys
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -82,21 +85,44 @@ def with_files_beside(data: dict[str, Any], path: Path) -> dict[str, Any]:
     return data | resolved
 
 
+def parts_with_files(data: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the place, such as "obstacles.0", and the data of each part of a scene that a file gives."""
+    for key in ("fluids", "obstacles"):
+        for k, part in enumerate(data.get(key, ())):
+            if isinstance(part, dict) and isinstance(part.get("file"), str):
+                yield f"{key}.{k}", part
+
+
+def places_beside(data: Mapping[str, Any], folder: Path) -> dict[str, str]:
+    """Return where each file of a scene lies as seen from `folder`, by its path, so that all may move together."""
+    places = {}
+    for _, part in parts_with_files(data):
+        with contextlib.suppress(ValueError):  # on another drive
+            places[part["file"]] = Path(os.path.relpath(os.path.abspath(part["file"]), folder.absolute())).as_posix()
+    return places
+
+
+def moved_along(data: dict[str, Any], places: Mapping[str, str], folder: Path) -> None:
+    """Replace in a scene's data each path of a file by that of the file in the same `places` beside `folder`."""
+    for _, part in parts_with_files(data):
+        beside = _resolved(folder.absolute(), str(places.get(part["file"], "")))
+        if beside is not None and part["file"] in places and (beside.is_file() or not os.path.isfile(part["file"])):
+            part["file"] = str(beside)
+
+
 def require_files_near(data: dict[str, Any], path: Path, source: str) -> None:
     """Raise `SceneError` if the scene in the checkpoint `path` names a file that lies neither here nor near the checkpoint.
 
     Here is the present folder and all below it; near is all below the folder that the run's own lies in.
     """
     folders = (Path.cwd(), path.resolve().parent.parent.parent)
-    for key in ("fluids", "obstacles"):
-        for k, part in enumerate(data.get(key, ())):
-            if isinstance(part, dict) and isinstance(part.get("file"), str):
-                file = _resolved(Path.cwd(), part["file"])
-                if file is None or not any(file.is_relative_to(folder) for folder in folders):
-                    raise SceneError(
-                        f"{source}: {key}.{k}.file: {part['file']!r} is neither below {folders[0]} nor below {folders[1]}; "
-                        "if it is yours, go on in its folder"
-                    )
+    for place, part in parts_with_files(data):
+        file = _resolved(Path.cwd(), part["file"])
+        if file is None or not any(file.is_relative_to(folder) for folder in folders):
+            raise SceneError(
+                f"{source}: {place}.file: {part['file']!r} is neither below {folders[0]} nor below {folders[1]}; "
+                "if it is yours, go on in its folder"
+            )
 
 
 def _resolved(folder: Path, file: str) -> Path | None:

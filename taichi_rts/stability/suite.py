@@ -124,7 +124,7 @@ class Plan:
 
     def fresh(self) -> None:
         """Start Taichi anew, which frees the fields of earlier runs."""
-        rts.init(self.arch, self.precision, unrolling_limit=0)  # `Rewind` unrolls over all fields
+        rts.init(self.arch, self.precision, restart=True, unrolling_limit=0)  # `Rewind` unrolls over all fields
 
 
 @dataclasses.dataclass(frozen=True)

@@ -124,8 +124,9 @@ def largest_stable(
     """Find the largest courant at which `scene` survives: double or halve from `first`, then bisect to a relative `tolerance`.
 
     `make_stepper` turns a courant into a stepper. `fresh` is called before every run: each builds a `Simulation`, whose Taichi
-    fields stay allocated until Taichi is started again, so pass e.g. `lambda: rts.init("cpu")` for more than a few runs.
-    `run` watches one run. Survival is taken to be monotonic: islands of stability above the first failure are not looked for.
+    fields stay allocated until Taichi is started again, so for more than a few runs pass e.g.
+    `lambda: rts.init("cpu", restart=True)`. `run` watches one run.
+    Survival is taken to be monotonic: islands of stability above the first failure are not looked for.
     Raises `Error` for bounds that are no interval.
     """
     if not (0.0 < lowest < highest and tolerance > 0.0):

@@ -24,7 +24,7 @@ def main():
     for scene in options.only.split(",") if options.only else invariants.names():
         for stepper in invariants.STEPPERS:
             key = f"{scene} {stepper}"
-            rts.init("cpu", options.precision, advanced_optimization=False)
+            rts.init("cpu", options.precision, restart=True, advanced_optimization=False)
             found = invariants.measure(invariants.small(scene), stepper)
             said = invariants.differences(found, kept[key]) if key in kept else ["new"]
             print(f"{key}: {'; '.join(said) or 'the same'}", flush=True)

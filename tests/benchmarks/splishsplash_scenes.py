@@ -84,7 +84,7 @@ def ours(path: Path) -> Iterator[str]:
     if count > MOST:
         runs, step = f"not tried: more than {MOST:,}", "-"
     else:
-        rts.init("cpu", advanced_optimization=False)  # a few steps need no fast kernels
+        rts.init("cpu", restart=True, advanced_optimization=False)  # a few steps need no fast kernels
         sim = rts.Simulation(scene, rts.Uniform())
         sim.advance_to(STEPS * sim.base_step)
         sane = np.isfinite(sim.positions()).all() and sim.statistics["runaways"] == 0

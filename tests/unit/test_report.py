@@ -31,6 +31,8 @@ def simulation(stepper, particles, updates, **more):
         keeps_work=True,
         work=lambda: 0.0,
         base_step=0.0005,
+        medium=SimpleNamespace(mass=0.01, sound_speed=10.0),
+        count=100,
         statistics=statistics,
         energy=lambda: Energy(1.0, 2.0, 0.5),
     )
@@ -105,4 +107,18 @@ def test_a_run_that_blew_up_says_where_and_why(capsys, monkeypatch):
     assert (
         "blown up at t = 0.02 s particle 7 at (0.1, 0.25) m, level 2 with a step of 1 ms: speed 90 m/s reaches the limit. "
         "Likely cause: an impact. Remedy: a smaller courant." in words
+    )
+
+
+def test_where_nothing_moves_at_the_start_a_change_of_energy_is_no_share_of_it(capsys, monkeypatch):
+    monkeypatch.setattr(report, "console", report.Console(width=120))
+    sim = simulation(rts.Uniform(), [1.0], [1.0])
+    assert report.energy_scale(sim) == 0.5  # 1 kg at a tenth of 10 m/s
+    report.print_table(sim, Energy(0.0, 0.0, 1.7e-7))
+    words = " ".join(capsys.readouterr().out.split())
+    assert "energy gained 3.5 J; at the start there was next to none" in words
+    assert "smaller --courant" not in words
+    report.print_table(sim, Energy(0.0, 0.0, 1.0))
+    assert "energy gained 250.00% of 1 J at the start; use a smaller --courant" in " ".join(
+        capsys.readouterr().out.split()
     )

@@ -516,3 +516,12 @@ def test_a_scene_with_everything_comes_back_from_plain_data(tmp_path):
     assert set(rts.Scene.__dataclass_fields__) - unlike <= left_out | {"domain", "spacing"}
     np.testing.assert_allclose(everything.fluids[3].positions, cloud + np.array([0.0, 0.05]))
     assert everything.fluid_colours == ("red", None, "#00ff00", "blue", None)
+
+
+def test_messages_shorten_long_lists():
+    times = [*(0.01 * k for k in range(400)), 0.0]
+    with pytest.raises(rts.SceneError) as raised:
+        rts.MovingWall("x-", times=times, displacements=[0.0] * 401)
+    assert str(raised.value) == "MovingWall: times (0.0, 0.01, 0.02, ..., 0.0) (401 entries) must ascend"
+    with pytest.raises(rts.SceneError, match=r"times \(0.0, 2.0, 1.0\) must ascend"):
+        rts.MovingWall("x-", times=[0, 2, 1], displacements=[0, 0, 0])

@@ -1,0 +1,123 @@
+"""What lives and dies with one start of Taichi: a clear error in place of a crash, once it is gone.
+
+Taichi frees all memory when it is started again, has its CPU threads only in the process that started it, and makes fields only
+in the thread that did.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import functools
+import gc
+import os
+import threading
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from taichi.lang import impl
+from taichi.lang._ndarray import Ndarray
+
+from taichi_rts.errors import BackendError
+
+FORKED = (
+    "this process was forked after Taichi had started, and Taichi's threads do not survive a fork: use "
+    'multiprocessing.get_context("spawn"), and call taichi_rts.init in each process (docs/starting.md)'
+)
+T = TypeVar("T", bound=type)
+_lost = False
+
+
+class Start:
+    """One start of Taichi, in this process and this thread."""
+
+    def __init__(self) -> None:
+        self._runtime = impl.get_runtime()  # a new object after each `ti.init` and `ti.reset`
+        self._thread, self._thread_name = threading.get_ident(), threading.current_thread().name
+
+    @property
+    def lives(self) -> bool:
+        """Whether Taichi has neither been started again nor reset since."""
+        return impl.get_runtime() is self._runtime and self._runtime.prog is not None
+
+    @property
+    def is_here(self) -> bool:
+        """Whether this is the thread in which Taichi was started."""
+        return threading.get_ident() == self._thread
+
+    def require(self, what: str) -> None:
+        """Raise `BackendError` if `what` lived in memory that Taichi has freed since, or in another process."""
+        if not self.lives:
+            require_own_process()
+            raise BackendError(
+                f"{what} belongs to an earlier init: Taichi has been started again or reset since, which frees its memory; "
+                "build it again, and call init once for all simulations"
+            )
+
+    def require_thread(self) -> None:
+        """Raise `BackendError` unless fields can be made here."""
+        if not self.is_here:
+            here = threading.current_thread().name
+            raise BackendError(
+                f"Taichi was started in thread {self._thread_name!r} and makes fields only there, not in {here!r}; build the "
+                "simulation there and run it in any thread, or call init in the thread that builds it (docs/starting.md)"
+            )
+
+
+def require_own_process() -> None:
+    """Raise `BackendError` in a process that was forked after Taichi had started."""
+    if _lost:
+        raise BackendError(FORKED)
+
+
+def holds_fields() -> bool:
+    """Whether anything would be lost if Taichi were started again: fields or arrays, of whoever made them."""
+    runtime = impl.get_runtime()
+    if runtime.prog is None:
+        return False
+    if runtime.prog.get_snode_tree_size() or runtime.global_vars or not impl.root.empty:
+        return True
+    # Taichi keeps no list of its arrays.
+    return any(
+        isinstance(thing, Ndarray) and getattr(thing, "_runtime", runtime) is runtime for thing in gc.get_objects()
+    )
+
+
+def guarded(*plain: str) -> Callable[[T], T]:
+    """Decorate a class with a `taichi_start`: its public methods and properties, but for `plain` ones, check that first."""
+
+    def decorate(kind: T) -> T:
+        for name, member in list(vars(kind).items()):
+            if name.startswith("_") or name in plain:
+                continue
+            if isinstance(member, property) and member.fget:
+                setattr(kind, name, property(_checked(member.fget), member.fset, member.fdel, member.__doc__))
+            elif callable(member):
+                setattr(kind, name, _checked(member))
+        return kind
+
+    return decorate
+
+
+def _checked(method: Callable[..., Any]) -> Callable[..., Any]:
+    @functools.wraps(method)
+    def checked(self: Any, *args: Any, **options: Any) -> Any:
+        self.taichi_start.require("this simulation")
+        return method(self, *args, **options)
+
+    return checked
+
+
+def _forget_in_child() -> None:
+    """In a forked child let go of Taichi's program: to use it, and even to end it, waits for threads that there are not."""
+    global _lost
+    runtime = impl.get_runtime()
+    if runtime.prog is not None:
+        _lost = True
+        with contextlib.suppress(AttributeError):  # no CPython
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(runtime.prog))  # so that its destructor never runs
+        runtime.prog = None
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_in_child)
