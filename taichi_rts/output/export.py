@@ -41,12 +41,14 @@ def require_attributes(names: Sequence[str]) -> None:
 
 
 def capture(sim: Simulation, attributes: Sequence[str] = DEFAULT_ATTRIBUTES) -> ParticleFrame:
-    """Return the particles of `sim` at its present time; reals are of its precision."""
+    """Return the particles of `sim` at its present time; reals are of its precision, positions as `Simulation.state` says."""
     require_attributes(attributes)
     state = sim.state()
     found = {name: ATTRIBUTES[name](sim, state) for name in attributes}
     reals = {
-        name: values.astype(state[0].dtype, copy=False) for name, values in found.items() if values.dtype.kind == "f"
+        name: values.astype(sim.backend.numpy_dtype, copy=False)
+        for name, values in found.items()
+        if values.dtype.kind == "f"
     }
     return ParticleFrame(state[0], found | reals, sim.time, sim.scene.spacing)
 
