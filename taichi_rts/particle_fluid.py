@@ -135,8 +135,13 @@ class Particles:
 
     def translated(self, shift: Vector) -> Particles:
         """Return the same particles, given by arrays, moved by `shift` [m], (dim,)."""
-        own = {"kinematic_viscosity": self.kinematic_viscosity, "colour": self.colour}
-        moved = Particles(self.positions + np.asarray(shift), self.velocities, self.densities, **own)
+        moved = Particles(
+            self.positions + np.asarray(shift),
+            self.velocities,
+            self.densities,
+            kinematic_viscosity=self.kinematic_viscosity,
+            colour=self.colour,
+        )
         object.__setattr__(moved, "_spacing", self.spacing)
         return moved
 

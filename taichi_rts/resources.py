@@ -200,7 +200,7 @@ def require_clock(scene: Scene, stepper: Any, end_time: float | None = None) -> 
 def require_resolution(scene: Scene, precision: str) -> None:
     """Raise `ResourceError` if the spacing is too fine for how coarsely positions in the domain are rounded.
 
-    A run counts them from `origin_of` the scene, so what counts is the domain's size; but the scene's own numbers, and what is read
+    A run counts them from `origin_of` the scene, so what counts is the domain's size. The scene's own numbers, and what is read
     of the run, are in double precision and count from 0.
     """
     limit = FINEST_POSITION * scene.spacing
