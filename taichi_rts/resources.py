@@ -42,7 +42,7 @@ SOUND_REALS = 9
 SINGLE, DOUBLE = 2.0**-24, 2.0**-53
 """By which share of itself a number is rounded at most."""
 FINEST_POSITION = 0.001
-"""Share of the spacing by which positions may be rounded: at 0.9 % a still pool moves 2 to 13 times as much."""
+"""Share of the spacing by which positions may be rounded: a still pool then moves half as fast again (docs/reliability.md)."""
 
 
 def device_bytes(

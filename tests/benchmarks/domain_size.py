@@ -1,6 +1,6 @@
 """What the rounding of positions costs: python tests/benchmarks/domain_size.py (CPU, f32).
 
-A still pool of 32 x 16 particles lies at the far end of a domain that is so long that single precision rounds positions there by a
+A still pool of 32 x 16 particles lies at the far end of a domain so long that single precision rounds positions there by a
 given share of the spacing. Prints its rms speed over sqrt(gH) from 2 to 3 s, when it has all but settled.
 """
 
