@@ -11,6 +11,8 @@ from taichi_rts.errors import ResourceError
 from taichi_rts.handover import change_stepper
 from taichi_rts.output.export import Exporter, capture
 from taichi_rts.output.series import Series
+from taichi_rts.particle_files.ply import read_ply
+from taichi_rts.particle_files.surface import write_surface
 from taichi_rts.placing import PLACES, at_origin, origin_of, translated
 from taichi_rts.rendering.painter import Painter, PictureOptions
 from taichi_rts.resources import require_resolution
@@ -262,6 +264,22 @@ def test_files_of_a_run_far_from_0_keep_its_positions(start_taichi, quick, tmp_p
         spacing=SPACING,
     )
     np.testing.assert_allclose(at_origin(whole).fluids[0].positions, x - np.asarray(UTM), atol=1e-7)
+
+
+def test_a_surface_far_from_0_is_the_one_at_0():
+    pytest.importorskip("pysplashsurf")
+    axis = 0.05 * np.arange(5)
+    x = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    velocity = {"velocity": np.ones_like(x, dtype=np.float32)}
+    surfaces = [
+        read_ply(write_surface(rts.ParticleFrame((x + at).astype(kind), velocity, spacing=0.05, origin=tuple(at))))
+        for at, kind in ((np.zeros(3), np.float32), (np.array([*UTM, 0.0]), np.float64))
+    ]
+    assert [surface.positions.dtype for surface in surfaces] == [np.float32, np.float64]
+    near, far = surfaces[0].positions, surfaces[1].positions - np.array([*UTM, 0.0])
+    assert len(near) == len(far) > 500
+    gaps = np.linalg.norm(near[:, None] - far, axis=2)  # corners may come in another order
+    assert gaps.min(axis=0).max() < 1e-4 * 0.05
 
 
 def test_files_near_0_are_as_they_were(tmp_path):
