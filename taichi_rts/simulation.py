@@ -367,7 +367,7 @@ class Simulation:
         return self.placed(x), v, rho, level
 
     def local_state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """The same with positions counted from `origin`, in the run's precision."""
+        """As `state`, with positions [m], (N, dim), counted from `origin`: all reals have the run's precision."""
         dtype, born = self.backend.numpy_dtype, self.particles.born
         x, v = np.empty((born, self.scene.dim), dtype), np.empty((born, self.scene.dim), dtype)
         rho, level = np.empty(born, dtype), np.empty(born, np.int32)
