@@ -11,7 +11,10 @@ from pydantic import Discriminator, Tag, model_validator
 from pydantic.dataclasses import dataclass
 
 from taichi_rts.errors import SceneError
-from taichi_rts.validation import FROZEN, Positive, Vector, validated
+from taichi_rts.validation import FROZEN, Number, Positive, Vector, validated
+
+Plane = Annotated[tuple[Number, ...], Len(2, 2)]
+"""A place in two dimensions."""
 
 
 class Field:
@@ -71,6 +74,17 @@ class LinearField(Field):
         zero = (0.0,) * self.dim
         return self.origin or zero, self.value or zero
 
+    def base_near(self, lower: Vector, upper: Vector) -> tuple[Vector, Vector]:
+        """`base`, or where `origin` is far from the box between `lower` and `upper` [m], the point 0 and the field there.
+
+        Far is farther than the box's longest side: single precision would round what little x - origin changes in the box.
+        """
+        origin, value = self.base
+        reach = max(b - a for a, b in zip(lower, upper, strict=True))
+        if all(a - reach <= x <= b + reach for a, x, b in zip(lower, origin, upper, strict=True)):
+            return origin, value
+        return (0.0,) * self.dim, tuple(self.at(np.zeros(self.dim)).tolist())
+
     @property
     def is_conservative(self) -> bool:
         """Whether the field has a potential: its gradient is symmetric."""
@@ -103,10 +117,12 @@ class TaylorGreen(Field):
     Attributes:
         speed: U [m/s], the largest speed.
         wavelength: [m], of two vortices side by side; a periodic axis holds a whole number of it.
+        origin: [m], (2,), where x = y = 0; None: the scene's.
     """
 
     speed: Positive
     wavelength: Positive
+    origin: Plane | None = None
 
     @property
     def dim(self) -> int:
@@ -115,7 +131,7 @@ class TaylorGreen(Field):
 
     def at(self, x: np.ndarray) -> np.ndarray:
         """Velocities [m/s], (..., 2), at positions `x` [m], (..., 2)."""
-        kx, ky = np.moveaxis(2.0 * math.pi / self.wavelength * np.asarray(x), -1, 0)
+        kx, ky = np.moveaxis(2.0 * math.pi / self.wavelength * _from(self.origin, x), -1, 0)
         return self.speed * np.stack([-np.cos(kx) * np.sin(ky), np.sin(kx) * np.cos(ky)], axis=-1)
 
     def top_speed(self, corners: np.ndarray) -> float:
@@ -135,11 +151,13 @@ class StandingWave(Field):
         speed: U [m/s], the largest vertical speed of the surface.
         wavelength: [m].
         depth: H [m].
+        origin: [m], (2,), where x = y = 0: on the floor, under a crest or a trough; None: the scene's.
     """
 
     speed: Positive
     wavelength: Positive
     depth: Positive
+    origin: Plane | None = None
 
     @property
     def dim(self) -> int:
@@ -153,13 +171,18 @@ class StandingWave(Field):
 
     def at(self, x: np.ndarray) -> np.ndarray:
         """Velocities [m/s], (..., 2), at positions `x` [m], (..., 2)."""
-        kx, ky = np.moveaxis(self.wavenumber * np.asarray(x), -1, 0)
+        kx, ky = np.moveaxis(self.wavenumber * _from(self.origin, x), -1, 0)
         scale = self.speed / math.sinh(self.wavenumber * self.depth)
         return scale * np.stack([-np.sin(kx) * np.cosh(ky), np.cos(kx) * np.sinh(ky)], axis=-1)
 
     def top_speed(self, corners: np.ndarray) -> float:
         """Speed [m/s] at the surface where it is largest."""
         return self.speed / math.tanh(self.wavenumber * self.depth)
+
+
+def _from(origin: Vector | None, x: np.ndarray) -> np.ndarray:
+    """Positions `x` [m], (..., 2), seen from `origin`."""
+    return np.asarray(x) if origin is None else np.asarray(x) - origin
 
 
 def _velocity_tag(data: Any) -> str:

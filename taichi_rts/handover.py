@@ -22,7 +22,7 @@ class Snapshot:
     Accelerations and steps are not in it: as at the start, everybody is due in the first step.
 
     Attributes:
-        positions, velocities: (N, dim) [m], [m/s].
+        positions, velocities: (N, dim) [m], counted from `Simulation.origin`, and [m/s].
         densities: (N,) [kg/m^3].
         guided_until: (N,) times [s] until which an inflow prescribes the velocity, where there is one.
         sound: sound speeds [m/s] and reference densities [kg/m^3], (2, N), where the sound speed is regional.
@@ -49,7 +49,7 @@ class Snapshot:
     @classmethod
     def of(cls, sim: Simulation) -> Snapshot:
         """Return that of `sim` at its present time."""
-        x, v, rho, _ = sim.state()
+        x, v, rho, _ = sim.local_state()
         p, inflows, outlets = sim.particles, sim.inflows, sim.outlets
         return cls(
             time=sim.time,

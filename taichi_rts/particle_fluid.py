@@ -133,6 +133,18 @@ class Particles:
         x = np.asarray(x, float) * self.scale
         return (x @ self._turn.T if self.rotation else x) + np.asarray(self.translation or 0.0)
 
+    def translated(self, shift: Vector) -> Particles:
+        """Return the same particles, given by arrays, moved by `shift` [m], (dim,)."""
+        moved = Particles(
+            self.positions + np.asarray(shift),
+            self.velocities,
+            self.densities,
+            kinematic_viscosity=self.kinematic_viscosity,
+            colour=self.colour,
+        )
+        object.__setattr__(moved, "_spacing", self.spacing)
+        return moved
+
     @model_serializer
     def _describe(self) -> dict[str, Any]:
         """Plain data: the file, or how many particles there are, with the hash that tells them from others."""

@@ -13,6 +13,7 @@ from taichi_rts import resorting
 from taichi_rts.backend import Backend, has_vulkan_hardware
 from taichi_rts.errors import ResourceError
 from taichi_rts.grid import CELLS_PER_BLOCK
+from taichi_rts.placing import origin_of, translated
 from taichi_rts.scene_size import finest_spacing, size_of
 from taichi_rts.solids import grid_nodes, make_solid
 from taichi_rts.stepping.timeline import MAX_TICKS
@@ -43,8 +44,10 @@ MOST_ADDRESSED = 2**32 - 1
 
 Taichi puts all fields that are made between two launches of kernels into one buffer, one behind the other.
 """
-FINEST_POSITION = 0.01
-"""Share of the spacing that positions must at least be told apart by."""
+SINGLE, DOUBLE = 2.0**-24, 2.0**-53
+"""By which share of itself a number is rounded at most."""
+FINEST_POSITION = 0.001
+"""Share of the spacing by which positions may be rounded: a still pool then moves half as fast again (docs/reliability.md)."""
 
 
 def device_bytes(
@@ -231,14 +234,31 @@ def require_clock(scene: Scene, stepper: Any, end_time: float | None = None) -> 
 
 
 def require_resolution(scene: Scene, precision: str) -> None:
-    """Raise `ResourceError` if positions in the domain are rounded too coarsely for the spacing."""
-    farthest = max(map(abs, (*scene.domain.lower, *scene.domain.upper)))
-    rounding = farthest * 2.0 ** (-53 if precision == "f64" else -24)
-    if rounding > FINEST_POSITION * scene.spacing:
+    """Raise `ResourceError` if the spacing is too fine for how coarsely positions in the domain are rounded.
+
+    A run counts them from `origin_of` the scene, so what counts is the domain's size. The scene's own numbers, and what is read
+    of the run, are in double precision and count from 0.
+    """
+    limit = FINEST_POSITION * scene.spacing
+
+    def reach(domain: Any) -> float:
+        return max(map(abs, (*domain.lower, *domain.upper)))
+
+    farthest = reach(scene.domain)
+    if (rounding := farthest * DOUBLE) > limit:
         raise ResourceError(
-            f"the domain reaches {farthest:g} m from the origin, where {precision} rounds positions by {rounding:.3g} m, more "
-            f"than {FINEST_POSITION:g} of the spacing {scene.spacing:g}; move it to the origin"
-            + ("" if precision == "f64" else ", or use --precision f64")
+            f"the domain reaches {farthest:g} m from 0, where numbers in double precision are rounded by {rounding:.3g} m, more "
+            f"than {FINEST_POSITION:g} of the spacing {scene.spacing:g}; move it towards 0, or use a spacing of at least "
+            f"{rounding / FINEST_POSITION:.3g}"
+        )
+    if precision == "f64":
+        return
+    size = reach(translated(scene.domain, tuple(-x for x in origin_of(scene))))
+    if (rounding := size * SINGLE) > limit:
+        raise ResourceError(
+            f"positions in the domain reach {size:g} m, where {precision} rounds them by {rounding:.3g} m, more than "
+            f"{FINEST_POSITION:g} of the spacing {scene.spacing:g}; use --precision f64, or a spacing of at least "
+            f"{rounding / FINEST_POSITION:.3g}"
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -260,4 +261,5 @@ def _pair_faults(scene: Scene, k: int, other: int) -> list[str]:
 
 
 def _slack(scene: Scene) -> float:
-    return 1e-9 * max(scene.domain.size)  # for lengths [m] that rounding blurs
+    corners = (*scene.domain.lower, *scene.domain.upper)
+    return 1e-9 * max(scene.domain.size) + 4.0 * math.ulp(max(map(abs, corners)))  # for lengths [m] that rounding blurs

@@ -36,6 +36,7 @@ from taichi_rts.physics.sound_rule import SoundRule
 from taichi_rts.physics.timetable import Ticking
 from taichi_rts.physics.viscosity import viscosity_terms
 from taichi_rts.physics.walls import Walls
+from taichi_rts.placing import at_origin, origin_of
 from taichi_rts.resources import require
 from taichi_rts.sampling import Sample, sample
 from taichi_rts.scene import Scene
@@ -86,6 +87,10 @@ class Simulation:
     `BackendError`. Building one compiles its kernels and evaluates the first forces. With `debug` the stepper
     checks at every step what is true by construction, and raises `AssertionError` where it is not; and the walls' impulse is
     added up.
+
+    Attributes:
+        scene: what is simulated, with "auto" decided.
+        local: the same with its coordinates counted from `origin`, as the device has them.
     """
 
     transient = frozenset({"_fluids", "taichi_start"})
@@ -94,9 +99,10 @@ class Simulation:
         backend = backends.current()
         self.taichi_start = backends.start_for_fields()
         self.stepper = stepper if stepper is not None else cast(Stepper, Regional())
-        self.scene = scene = scene.with_sound_for(self.stepper)
+        self.scene = scene.with_sound_for(self.stepper)
         self.backend = backend
-        require(scene, [self.stepper], backend, debug=debug)
+        require(self.scene, [self.stepper], backend, debug=debug)
+        self.local = scene = at_origin(self.scene)
         start = sample(scene)
         self.medium = Medium.of(scene, start.mass)
         self.timeline = self.stepper.timeline(scene)
@@ -299,7 +305,7 @@ class Simulation:
 
     def _potential(self, time: float) -> float:
         """Potential energy [J] that the present positions have in the gravity of `time` [s]."""
-        return measure_energy(self.scene, self.medium, *self.state()[:3], time).potential
+        return measure_energy(self.local, self.medium, *self.local_state()[:3], time).potential
 
     def _advance(self, time: float) -> None:
         target = self.timeline.ticks_until(time)
@@ -353,8 +359,27 @@ class Simulation:
         """The base step dt_b [s]; levels step at whole multiples of it."""
         return self.timeline.tick * self.schedule.base_ticks
 
+    @property
+    def origin(self) -> tuple[float, ...]:
+        """Point [m], (dim,), from which the run counts its positions: 0 unless the domain lies far from it (`placing`)."""
+        return origin_of(self.scene)
+
+    def placed(self, x: np.ndarray) -> np.ndarray:
+        """Positions `x` [m], (..., dim), counted from `origin`, as the scene counts: in double precision unless that is 0."""
+        if not any(self.origin):
+            return x
+        return np.clip(x + np.asarray(self.origin), self.scene.domain.lower, self.scene.domain.upper)
+
     def state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Positions [m] and velocities [m/s], (N, dim), densities [kg/m^3] and levels, (N,), at `time`, by particle id."""
+        """Positions [m] and velocities [m/s], (N, dim), densities [kg/m^3] and levels, (N,), at `time`, by particle id.
+
+        Reals have the run's precision, positions in a domain far from 0 double precision.
+        """
+        x, v, rho, level = self.local_state()
+        return self.placed(x), v, rho, level
+
+    def local_state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """As `state`, with positions [m], (N, dim), counted from `origin`: all reals have the run's precision."""
         dtype, born = self.backend.numpy_dtype, self.particles.born
         x, v = np.empty((born, self.scene.dim), dtype), np.empty((born, self.scene.dim), dtype)
         rho, level = np.empty(born, dtype), np.empty(born, np.int32)
@@ -366,7 +391,7 @@ class Simulation:
         return x[ids], v[ids], rho[ids], level[ids]
 
     def positions(self) -> np.ndarray:
-        """Positions [m], (N, dim), predicted to `time`, in order of particle id."""
+        """Positions [m], (N, dim), predicted to `time`, in order of particle id; far from 0 in double precision (`state`)."""
         return self.state()[0]
 
     def velocities(self) -> np.ndarray:
@@ -431,8 +456,7 @@ class Simulation:
 
     def energy(self) -> Energy:
         """Kinetic, potential and internal energy [J] at `time`."""
-        x, v, rho, _ = self.state()
-        return measure_energy(self.scene, self.medium, x, v, rho, self._time)
+        return measure_energy(self.local, self.medium, *self.local_state()[:3], self._time)
 
     @property
     def keeps_work(self) -> bool:
@@ -481,8 +505,9 @@ class Simulation:
             raise Error(f"scene {self.scene.name!r} has 0 obstacles, so no force acts on one; give it at least 1")
         if self._meter is None:
             self.taichi_start.require_thread()
-            self._meter = ForceMeter(self.scene, self.motion, self._obstacle_layers, self.walls, self.backend)
-        return self._meter.measure(self.medium.mass, self.timeline.now, self.timeline.tick)
+            self._meter = ForceMeter(self.local, self.motion, self._obstacle_layers, self.walls, self.backend)
+        found = self._meter.measure(self.medium.mass, self.timeline.now, self.timeline.tick)
+        return found._replace(pivots=found.pivots + np.asarray(self.origin))
 
     @property
     def keeps_momentum_budget(self) -> bool:

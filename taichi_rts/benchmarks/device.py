@@ -97,7 +97,7 @@ def device(settings: Settings) -> Iterator[Row]:
         paper = rts.Simulation(scene, rts.Regional(preset="paper"))
         paper.advance_to(time)
         even = rts.Simulation(scene, rts.Uniform(0.4))
-        timing.put(even, *paper.state()[:3])
+        timing.put(even, *paper.local_state()[:3])
         ours, theirs = timing.in_turn([paper, even], [36, 12], settings.repeats)
         gain = timing.median_of(theirs, lambda pace: pace.wall_per_step) / timing.median_of(
             ours, lambda pace: pace.wall_per_step

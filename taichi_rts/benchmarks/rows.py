@@ -161,7 +161,7 @@ def regional_against_uniform(settings: Settings) -> Iterator[Row]:
         for k, time in enumerate(times):
             for paper in papers:
                 paper.advance_to(time)
-            timing.put(uniform, *papers[0].state()[:3])
+            timing.put(uniform, *papers[0].local_state()[:3])
             paces = timing.in_turn([*papers, uniform], [12, 12, 4], 3)
             walls[k] = [timing.median_of(each, lambda pace: pace.wall_per_step) for each in paces]
             shares[k] = [np.mean([pace.updates / pace.steps / uniform.count for pace in each]) for each in paces[:2]]

@@ -26,7 +26,7 @@ from taichi_rts.simulation import Simulation
 from taichi_rts.state import State
 from taichi_rts.stepping.steppers import stepper_data, stepper_from
 
-FORMAT = 2
+FORMAT = 3
 """Counts up when the file's layout changes."""
 VALUE = "value:"
 """Begins the names of arrays that are plain values, not fields."""

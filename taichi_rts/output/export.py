@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import difflib
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from taichi_rts.errors import OutputError
 from taichi_rts.output.files import write_bytes
-from taichi_rts.particle_files.formats import require_format
+from taichi_rts.particle_files.formats import FORMATS, require_format
 from taichi_rts.particle_files.frame import ParticleFrame
 from taichi_rts.particle_files.vtu import collection
 from taichi_rts.simulation import Simulation
@@ -41,14 +43,16 @@ def require_attributes(names: Sequence[str]) -> None:
 
 
 def capture(sim: Simulation, attributes: Sequence[str] = DEFAULT_ATTRIBUTES) -> ParticleFrame:
-    """Return the particles of `sim` at its present time; reals are of its precision."""
+    """Return the particles of `sim` at its present time; reals are of its precision, positions as `Simulation.state` says."""
     require_attributes(attributes)
     state = sim.state()
     found = {name: ATTRIBUTES[name](sim, state) for name in attributes}
     reals = {
-        name: values.astype(state[0].dtype, copy=False) for name, values in found.items() if values.dtype.kind == "f"
+        name: values.astype(sim.backend.numpy_dtype, copy=False)
+        for name, values in found.items()
+        if values.dtype.kind == "f"
     }
-    return ParticleFrame(state[0], found | reals, sim.time, sim.scene.spacing)
+    return ParticleFrame(state[0], found | reals, sim.time, sim.scene.spacing, sim.origin)
 
 
 def write_particles(path: str | Path, frame: ParticleFrame) -> None:
@@ -56,7 +60,19 @@ def write_particles(path: str | Path, frame: ParticleFrame) -> None:
     path = Path(path)
     each = require_format(path.suffix[1:].lower(), frame.dim)
     assert each.write is not None  # for mypy
+    warn_of_offset(path.suffix[1:].lower(), frame)
     write_bytes(path, each.write(frame))
+
+
+def warn_of_offset(name: str, frame: ParticleFrame) -> None:
+    """Warn if a file of the format `name` holds the positions of `frame` less an offset."""
+    if FORMATS[name].single and frame.offset.any():
+        warnings.warn(
+            f"{name} holds single precision, too coarse for positions {np.abs(frame.positions).max():g} m from 0: they are "
+            f"written less {tuple(frame.offset.tolist())}, which each point has as the attribute 'offset'; vtu, npz and ply hold "
+            "double precision",
+            stacklevel=3,
+        )
 
 
 class Exporter:
@@ -80,6 +96,8 @@ class Exporter:
         require_attributes(self.attributes)
         self.times: list[float] = []
         """Times [s] of the frames written."""
+        self.offsets: dict[str, list[float]] = {}
+        """Formats that hold positions less an offset, which is this [m]."""
 
     def take_up(self, times: Sequence[float]) -> None:
         """Go on behind the frames of `times` [s], which an earlier run has written."""
@@ -93,6 +111,10 @@ class Exporter:
         for name in self.formats:
             require_format(name, frame.dim)
         self.times.append(sim.time)
+        for name in self.formats:
+            if FORMATS[name].single and frame.offset.any() and name not in self.offsets:
+                warn_of_offset(name, frame)
+                self.offsets[name] = frame.offset.tolist()
         for each in self.formats.values():
             assert each.write is not None  # for mypy
             write_bytes(self.folder / each.folder / f"{len(self.times) - 1:06d}{each.suffix}", each.write(frame))
@@ -104,7 +126,8 @@ class Exporter:
             )
 
     @property
-    def files(self) -> dict[str, str]:
-        """Where the files are, below the folder, by format: NNNNNN stands for the number of the frame."""
-        found = {name: f"{each.folder}/NNNNNN{each.suffix}" for name, each in self.formats.items()}
+    def files(self) -> dict[str, Any]:
+        """Where the files are, below the folder, by format: NNNNNN stands for the number of the frame; and offsets [m]."""
+        found: dict[str, Any] = {name: f"{each.folder}/NNNNNN{each.suffix}" for name, each in self.formats.items()}
+        found |= {f"{name}_offset": offset for name, offset in self.offsets.items()}
         return found | ({"pvd": "particles/particles.pvd"} if "vtu" in self.formats else {})

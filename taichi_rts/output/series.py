@@ -33,7 +33,7 @@ class Series:
     def __init__(self, path: str | Path, sim: Simulation, times: Sequence[float] = ()) -> None:
         self.path = Path(path)
         self.sim = sim
-        self.forces = FaceForces(sim.scene, sim.medium)
+        self.forces = FaceForces(sim.local, sim.medium)
         self.times: list[float] = []
         """Times [s] of the rows written."""
         if times and self.path.exists():
@@ -44,7 +44,8 @@ class Series:
     def __call__(self, sim: Simulation | None = None) -> None:
         """Add a row; `sim` is the one it was made for, for callers that name it."""
         row = self.measure()
-        line = ",".join(f"{value:.9g}" for value in row.values()) + "\n"
+        digits = 15 if any(self.sim.origin) else 9  # far from 0 coordinates need more of them
+        line = ",".join(f"{value:.{digits}g}" for value in row.values()) + "\n"
         if self.times and self.path.exists():  # the folder may have been deleted meanwhile
             append(self.path, line.encode())
         else:
@@ -53,18 +54,18 @@ class Series:
 
     def measure(self) -> dict[str, float]:
         """Return the present values by column."""
-        sim, scene = self.sim, self.sim.scene
-        x, v, rho, level = sim.state()
+        sim, scene = self.sim, self.sim.local
+        x, v, rho, level = sim.local_state()
         p = sim.medium.equation_of_state.pressure_numpy(rho)
         lengths = measuring.periods(scene)
-        centre = x.sum(axis=0, dtype=np.float64) / max(1, len(x))  # outlets may have taken out all
+        centre = x.sum(axis=0, dtype=np.float64) / max(1, len(x)) + sim.origin  # outlets may have taken out all
         points = np.array([probe.position for probe in scene.probes]).reshape(-1, scene.dim)
         pressures = measuring.interpolate(x, p, points, sim.medium.kernel, lengths)
         heights = [measuring.water_height(scene, sim.medium, x, np.asarray(g.position)) for g in scene.gauges]
         return {
             "time": sim.time,
             **{f"{name}_energy": value for name, value in sim.energy()._asdict().items()},
-            "front": measuring.front(x),
+            "front": measuring.front(x) + sim.origin[0],
             **dict(zip((f"centre_{axis}" for axis in AXES), centre, strict=False)),
             "max_speed": float(np.linalg.norm(v, axis=1).max(initial=0.0)),
             **self._shares(level),

@@ -1,7 +1,8 @@
 """Houdini's classic BGEO, version 5, as Houdini, Partio and splashsurf read it: points only, no primitives.
 
 "Documentation on the Public Domain Geometry Library (GPD), Version 5", SideFX: big-endian, every attribute 32 bits a
-component. Points are x, y, z, w and then their attributes.
+component. Points are x, y, z, w and then their attributes. Where single precision is too coarse for the positions, they are
+written less an offset, which each point has as an attribute of that name.
 """
 
 from __future__ import annotations
@@ -10,13 +11,14 @@ import struct
 
 import numpy as np
 
-from taichi_rts.particle_files.frame import ParticleFrame, from_arrays
+from taichi_rts.particle_files.frame import ParticleFrame, from_arrays, pad
 from taichi_rts.particle_files.unpacking import gunzip
 
 MAGIC = b"BgeoV"
 VERSION = 5
 END = b"\x00\xff"  # begin and end of the "extra" section, which is empty
 FLOAT, INTEGER, INDEX, VECTOR = 0, 1, 4, 5  # kinds of attributes
+OFFSET = "offset"
 HOUDINI_NAMES = {"velocity": "v"}
 OUR_NAMES = {name: ours for ours, name in HOUDINI_NAMES.items()}
 
@@ -24,8 +26,12 @@ OUR_NAMES = {name: ours for ours, name in HOUDINI_NAMES.items()}
 def write_bgeo(frame: ParticleFrame) -> bytes:
     """Return `frame` as a BGEO file: velocity is `v`, as Houdini calls it, and `pscale` half the spacing."""
     arrays = frame.arrays()
-    positions = arrays.pop("position")
+    positions, offset = arrays.pop("position"), frame.offset
     count = len(positions)
+    if offset.any():
+        offset = pad(offset[None])
+        positions = positions - offset
+        arrays[OFFSET] = np.broadcast_to(offset.astype(np.float32), (count, 3))
     if frame.spacing is not None:
         arrays["pscale"] = np.full(count, 0.5 * frame.spacing, np.float32)
     head = [MAGIC, struct.pack(">9i", VERSION, count, 0, 0, 0, len(arrays), 0, 0, 0)]
@@ -33,7 +39,7 @@ def write_bgeo(frame: ParticleFrame) -> bytes:
     for name, values in arrays.items():
         size = values.shape[1] if values.ndim == 2 else 1
         whole = values.dtype.kind in "iu"
-        kind = VECTOR if size == 3 else INTEGER if whole else FLOAT
+        kind = VECTOR if size == 3 and name != OFFSET else INTEGER if whole else FLOAT
         title = HOUDINI_NAMES.get(name, name).encode()
         head.append(struct.pack(">H", len(title)) + title + struct.pack(">Hi", size, kind) + bytes(4 * size))
         row.append((name, f"({size},)>{'i' if whole and kind == INTEGER else 'f'}4"))
@@ -74,4 +80,6 @@ def read_bgeo(data: bytes) -> ParticleFrame:
     arrays = {name: points[name].astype(points[name].dtype.newbyteorder("=")) for name, _ in row}
     arrays = {name: values[:, 0] if values.shape[1] == 1 else values for name, values in arrays.items()}
     arrays["position"] = arrays["position"][:, :3]
+    if OFFSET in arrays and arrays[OFFSET].shape == arrays["position"].shape:
+        arrays["position"] = arrays["position"].astype(np.float64) + arrays.pop(OFFSET)
     return from_arrays(arrays)

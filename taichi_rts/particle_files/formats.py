@@ -29,6 +29,7 @@ class Format:
         package, extra: what has to be installed to write it, and the extra of `taichi_rts` that has it.
         folder: of a run's folder in which its files lie.
         dims: numbers of space dimensions that it can hold.
+        single: whether it holds reals in single precision alone, and so positions far from 0 less an offset.
     """
 
     suffix: str
@@ -38,13 +39,14 @@ class Format:
     extra: str = ""
     folder: str = "particles"
     dims: tuple[int, ...] = (2, 3)
+    single: bool = False
 
 
 FORMATS = {
     "vtu": Format(".vtu", write_vtu, read_vtu),
     "ply": Format(".ply", write_ply, read_ply),
     "npz": Format(".npz", write_npz, read_npz),
-    "bgeo": Format(".bgeo", write_bgeo, read_bgeo),
+    "bgeo": Format(".bgeo", write_bgeo, read_bgeo, single=True),
     "vtkhdf": Format(".vtkhdf", write_vtkhdf, package="h5py", extra="hdf"),
     "surface": Format(".ply", write_surface, package="pysplashsurf", extra="surface", folder="surface", dims=(3,)),
     "csv": Format(".csv", read=read_csv),

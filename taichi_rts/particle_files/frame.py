@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 AXES = ("x", "y", "z")
+COARSEST = 1e-3
+"""Share of the spacing by which single precision may round positions in files."""
 COMPONENTS = {"velocity": ("vx", "vy", "vz")}
 """Columns of a vector in formats that know only scalars; another one's are NAME_x, NAME_y, NAME_z."""
 
@@ -20,17 +22,41 @@ class ParticleFrame:
         attributes: what else is known of each particle by name, (N,) or (N, dim) each.
         time: [s].
         spacing: initial particle spacing [m] of the scene they are from, None where a file does not say.
+        origin: a point [m], (dim,), near them that is the same in all frames of a run, None: their own lower corner.
     """
 
     positions: np.ndarray
     attributes: dict[str, np.ndarray] = field(default_factory=dict)
     time: float = 0.0
     spacing: float | None = None
+    origin: tuple[float, ...] | None = None
 
     @property
     def dim(self) -> int:
         """Number of space dimensions, 2 or 3."""
         return int(self.positions.shape[1])
+
+    @property
+    def needs_double(self) -> bool:
+        """Whether single precision rounds the positions by more than `COARSEST` of the spacing."""
+        return self.positions.dtype == np.float64 and len(self.positions) > 0 and self._rounds(self.positions)
+
+    @property
+    def offset(self) -> np.ndarray:
+        """A point [m], (dim,), near `origin` that single precision holds, as it then holds the rest; 0 where it needs none."""
+        found = np.zeros(self.dim)
+        if self.origin is not None:
+            found = np.asarray(self.origin, float)
+        elif self.needs_double:
+            found = self.positions.min(axis=0)
+        return found.astype(np.float32).astype(np.float64) if self._rounds(found) else np.zeros(self.dim)
+
+    def _rounds(self, x: np.ndarray) -> bool:
+        """Whether single precision is too coarse for coordinates `x` [m]; without a spacing that of a lattice counts."""
+        spacing = self.spacing
+        if spacing is None:
+            spacing = float(np.ptp(self.positions, axis=0).max()) / len(self.positions) ** (1.0 / self.dim)
+        return float(np.abs(x).max()) * 2.0**-24 > COARSEST * spacing
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return `position` and all attributes, (N,) or (N, 3) each, what is 2D with a zero: what formats for 3D tools hold."""

@@ -1,6 +1,7 @@
 """PLY, binary and little-endian: a vertex for each particle, a property for each number, and faces for a surface.
 
-G. Turk, "The PLY Polygon File Format" (1994). Reals are single precision, the only kind that every reader takes.
+G. Turk, "The PLY Polygon File Format" (1994). Reals are single precision, the only kind that every reader takes; positions are
+double precision where single is too coarse for them.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import re
 
 import numpy as np
 
-from taichi_rts.particle_files.frame import ParticleFrame, from_columns
+from taichi_rts.particle_files.frame import AXES, ParticleFrame, from_columns
 
 NAMES = {
     "f4": "float",
@@ -39,6 +40,8 @@ def write_ply(frame: ParticleFrame, triangles: np.ndarray | None = None) -> byte
     """Return `frame` as a PLY file; `triangles`, (T, 3), join its particles to a surface."""
     columns = frame.columns()
     kinds = {name: "i4" if values.dtype.kind in "iu" else "f4" for name, values in columns.items()}
+    if frame.needs_double:
+        kinds |= dict.fromkeys(AXES, "f8")
     head = [
         "ply",
         "format binary_little_endian 1.0",

@@ -34,7 +34,12 @@ def write_surface(frame: ParticleFrame) -> bytes:
         "decimate_barnacles": True,
         "multi_threading": True,
     }
-    result = pysplashsurf.reconstruction_pipeline(np.ascontiguousarray(frame.positions), **options)
+    offset = frame.offset
+    local = frame.positions - offset if offset.any() else frame.positions
+    for values in velocity.values():  # which have the run's precision, and both have to have the same
+        local = local.astype(values.dtype, copy=False)
+    result = pysplashsurf.reconstruction_pipeline(np.ascontiguousarray(local), **options)
     mesh: Any = result[0] if isinstance(result, tuple) else result
     corners = {name: values for name, values in mesh.point_attributes.items() if name in velocity}
-    return write_ply(ParticleFrame(mesh.mesh.vertices, corners, frame.time), mesh.mesh.triangles)
+    vertices = mesh.mesh.vertices + offset if offset.any() else mesh.mesh.vertices
+    return write_ply(ParticleFrame(vertices, corners, frame.time, frame.spacing, frame.origin), mesh.mesh.triangles)

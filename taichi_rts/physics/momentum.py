@@ -54,7 +54,7 @@ class Gravity:
         self.has_body_force = force is not None
         if force is not None:
             self.force_gradient = force.gradient
-            self.force_origin, self.force_value = force.base
+            self.force_origin, self.force_value = force.base_near(scene.domain.lower, scene.domain.upper)
 
     @ti.func
     def acceleration(self, x, now, tick):

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_rts.placing import at_origin
 from taichi_rts.rendering import colours
 from taichi_rts.rendering.ggui import LiveWindow
 from taichi_rts.rendering.painter import PictureOptions, make_camera
@@ -59,8 +60,9 @@ def watch(
     session = LiveSession(scene, stepper, options, folder or Path("out") / scene.name)
     free = max(64, options.width - round(PANEL_WIDTH))
     aside = 0.5 * (options.width - free) / options.height  # by which the scene is moved out from under the panel
-    camera = make_camera(scene, dataclasses.replace(options, width=free)).panned(-aside, 0.0)
-    outline = (scene.domain.lower, scene.domain.upper)
+    local = at_origin(scene)
+    camera = make_camera(local, dataclasses.replace(options, width=free)).panned(-aside, 0.0)
+    outline = (local.domain.lower, local.domain.upper)
     while window.running and not session.over:
         for key in window.pressed():
             session.press(key)

@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from taichi_rts.errors import RenderError
+from taichi_rts.placing import at_origin
 from taichi_rts.rendering import colours, legend
 from taichi_rts.rendering.camera import Camera
 from taichi_rts.rendering.obstacles import ObstaclePoints
@@ -106,7 +107,7 @@ class Painter:
     """Paints one simulation's present state again and again with the same options."""
 
     def __init__(self, scene: Scene, options: PictureOptions, title: str = "", renderer: Any = None) -> None:
-        self.scene = scene
+        self.scene = scene = at_origin(scene)  # pictures are drawn in single precision
         self.options = options
         self.title = title
         self.renderer = renderer if renderer is not None else make_renderer(options)
@@ -117,7 +118,7 @@ class Painter:
 
     def paint(self, sim: Simulation) -> np.ndarray:
         """Return the picture of `sim` at its present time, (height, width, 3) uint8, or 4 if it is transparent."""
-        x, v, rho, level = sim.state()
+        x, v, rho, level = sim.local_state()
         tints = self.colours(sim, v, rho, level)
         outline = (self.scene.domain.lower, self.scene.domain.upper)
         x, tints = self.obstacles.add(x, tints, sim.time)

@@ -331,10 +331,11 @@ class LiveSession:
     def view(self) -> View:
         """Return the fluid and the obstacles as they are now, cut open at the clip plane."""
         sim, radius = self.sim, 0.5 * self.scene.spacing * self.scale
-        x, v, rho, level = sim.state()
+        x, v, rho, level = sim.local_state()
         x, tints = self.painter.obstacles.add(x, self.painter.colours(sim, v, rho, level), sim.time)
         if self.clip_axis >= 0:
-            low, high = self.scene.domain.lower[self.clip_axis], self.scene.domain.upper[self.clip_axis]
+            box = sim.local.domain
+            low, high = box.lower[self.clip_axis], box.upper[self.clip_axis]
             kept = x[:, self.clip_axis] <= low + self.clip_share * (high - low)
             x, tints = x[kept], tints[kept]
         return View(x, tints, radius)

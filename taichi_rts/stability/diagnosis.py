@@ -59,7 +59,7 @@ def diagnose(sim: Simulation) -> Diagnosis | None:
 
     It reads the present state, so it says most when called soon after things went wrong.
     """
-    x, v, rho, levels = (np.asarray(values, dtype=np.float64) for values in sim.state())
+    x, v, rho, levels = (np.asarray(values, dtype=np.float64) for values in sim.local_state())
     ratio = rho / sim.medium.rest_density
     thin = LEAST_DENSITY / np.maximum(ratio, 1e-30)
     if (
@@ -85,7 +85,7 @@ def diagnose(sim: Simulation) -> Diagnosis | None:
     return Diagnosis(
         time=sim.time,
         particle=particle,
-        position=tuple(x[particle]),
+        position=tuple(sim.placed(x[particle])),
         velocity=tuple(v[particle]),
         level=int(levels[particle]),
         step=float(steps[particle]),
@@ -99,7 +99,7 @@ def diagnose(sim: Simulation) -> Diagnosis | None:
 def _criteria(sim: Simulation, x: np.ndarray, particle: int, speed: np.ndarray, acceleration: np.ndarray) -> str:
     """Return what limits the step in the particle's block, in one sentence."""
     geometry, c, r = sim.grid.geometry, sim.medium.sound_speed, sim.medium.support
-    inside = np.clip(np.nan_to_num(x), sim.scene.domain.lower, sim.scene.domain.upper)
+    inside = np.clip(np.nan_to_num(x), sim.local.domain.lower, sim.local.domain.upper)
     blocks = geometry.cell_numpy(inside) // CELLS_PER_BLOCK
     mates = blocks == blocks[particle]
     v, a = (float(values[mates & np.isfinite(values)].max(initial=0.0)) for values in (speed, acceleration))

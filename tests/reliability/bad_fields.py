@@ -59,6 +59,8 @@ VALID = {
     "2D: fluids.0.velocity": {"missing"},
     "2D: fluids.1.velocity": {"missing"},
     "2D: fluids.0.velocity.depth": {"missing"},
+    "2D: fluids.0.velocity.origin": {"missing"},
+    "2D: fluids.1.velocity.origin": {"missing"},
     "2D: sound_speed": {"missing"},
     "2D: sound_speed.mach": {"missing"},
     "2D: sound_speed.memory": {"missing"},

@@ -103,9 +103,9 @@ FLAT: dict[str, Any] = {
         {
             "lower": [0.0, 0.0],
             "upper": [1.0, 0.5],
-            "velocity": {"speed": 0.1, "wavelength": 1.0, "depth": 0.5},
+            "velocity": {"speed": 0.1, "wavelength": 1.0, "depth": 0.5, "origin": [0.0, 0.0]},
         },
-        {"lower": [0.0, 0.5], "upper": [1.0, 0.6], "velocity": {"speed": 0.1, "wavelength": 1.0}},
+        {"lower": [0.0, 0.5], "upper": [1.0, 0.6], "velocity": {"speed": 0.1, "wavelength": 1.0, "origin": [0.5, 0.5]}},
     ],
     "obstacles": [{"shape": "polygon", "points": [[0.6, 0.7], [0.9, 0.7], [0.9, 0.9]]}],
 }

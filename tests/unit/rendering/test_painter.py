@@ -109,7 +109,9 @@ def test_two_views_show_the_same_state_at_one_time_in_a_picture_of_the_asked_siz
     painter = Painter(scene, options, renderer=canvas)
     asked = []
     sim = simulation(rts.Regional(), 2)
-    sim.state = lambda: asked.append(1) or (np.ones((4, 3)), np.zeros((4, 3)), np.full(4, 1e3), np.array([1, 2, 2, 2]))
+    sim.local_state = lambda: (
+        asked.append(1) or (np.ones((4, 3)), np.zeros((4, 3)), np.full(4, 1e3), np.array([1, 2, 2, 2]))
+    )
     panels = []
     draw = legend.draw_legend
     monkeypatch.setattr(legend, "draw_legend", lambda *a, **k: panels.append(a[1:]) or draw(*a, **k))
