@@ -185,6 +185,7 @@ def line_walls(scene: Scene) -> tuple[WallLayer, np.ndarray]:
     numbers: dict[str, int] = {wall.face: number for number, wall in enumerate(scene.moving_walls)}
     s = scene.spacing
     depth, volume = calibrate_walls(scene)
+    depths = depth + s * np.arange(wall_planes(scene))
     inner, stretch = [], []
     for low, high in zip(scene.domain.lower, scene.domain.upper, strict=True):
         count = max(1, round((high - low) / s))
@@ -195,17 +196,17 @@ def line_walls(scene: Scene) -> tuple[WallLayer, np.ndarray]:
     for axis in range(scene.dim):  # the two faces across `axis`; earlier axes' faces own the edges they share
         if scene.is_periodic[axis]:
             continue
-        faces = np.array([scene.domain.lower[axis] - depth, scene.domain.upper[axis] + depth])
+        faces = np.concatenate([scene.domain.lower[axis] - depths[::-1], scene.domain.upper[axis] + depths])
         beyond = [
             inner[d]
             if scene.is_periodic[d]
-            else np.concatenate([[scene.domain.lower[d] - depth], inner[d], [scene.domain.upper[d] + depth]])
+            else np.concatenate([scene.domain.lower[d] - depths[::-1], inner[d], scene.domain.upper[d] + depths])
             for d in range(axis + 1, scene.dim)
         ]
         positions.append(_product([*inner[:axis], faces, *beyond]))
         share = math.prod(stretch[d] for d in range(scene.dim) if d != axis)
         volumes.append(np.full(len(positions[-1]), volume * share))
-        behind = positions[-1][:, axis] == faces[0]
+        behind = positions[-1][:, axis] < scene.domain.lower[axis]
         normals.append(np.where(behind, 1.0, -1.0)[:, None] * np.eye(scene.dim)[axis])
         owners.append(np.where(behind, numbers.get(AXES[axis] + "-", -1), numbers.get(AXES[axis] + "+", -1)))
     layer = WallLayer(
@@ -271,6 +272,11 @@ def wall_stiffness(scene: Scene) -> float:
     return CONTINUED_LATTICE if scene.density == "continuity" else WALL_STIFFNESS
 
 
+def wall_planes(scene: Scene) -> int:
+    """How many planes of wall particles lie behind a face: as many as the lattice would have in reach of a resting layer."""
+    return max(1, math.ceil(scene.support_ratio - 1e-9) - 1)
+
+
 def calibrate_walls(scene: Scene) -> tuple[float, float]:
     """Depth [m] of the wall layer behind a face and volume V_b [m^dim] of its particles, for a lattice resting on the face.
 
@@ -291,12 +297,15 @@ def calibrate_walls(scene: Scene) -> tuple[float, float]:
     def missing(d: float) -> float:
         return sum(plane(d + k * s) for k in range(reach))
 
+    def laid(d: float) -> float:
+        return sum(plane(d + k * s) for k in range(wall_planes(scene)))
+
     wanted = wall_stiffness(scene) * slope(missing, s) / missing(s)
     near, far = s, 0.95 * r
     for _ in range(60):
         middle = 0.5 * (near + far)
-        near, far = (middle, far) if slope(plane, middle) / plane(middle) > wanted else (near, middle)
-    return near - 0.5 * s, missing(s) / (plane(near) * lattice_sum(kernel, dim, s))
+        near, far = (middle, far) if slope(laid, middle) / laid(middle) > wanted else (near, middle)
+    return near - 0.5 * s, missing(s) / (laid(near) * lattice_sum(kernel, dim, s))
 
 
 def plane_sum(scene: Scene) -> Callable[[float], float]:
