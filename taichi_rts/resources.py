@@ -35,7 +35,7 @@ BLOCK_INTEGERS = {"uniform": 2, "regional": 10, "asynchronous": 9}
 FIXED = 1 << 14
 """Bytes of fields whose size does not depend on the scene, about."""
 WALL_SHARE = 0.45
-"""Entries of the windows on a wall at rest over those of the windows on the fluid, about."""
+"""Entries of the windows on a wall at rest over those of the windows on the fluid at r = 2s, about."""
 SOUND_REALS = 9
 """Fields of reals with an entry for each block that a regional sound speed needs."""
 FINEST_POSITION = 0.01
@@ -78,10 +78,12 @@ def device_bytes(
     nodes = sum(_nodes(scene, spacing))
     windows = entries(room(dim, (scene.support_ratio * (1.0 + 2.0 * stepper.drift)) ** dim))
     near = 2 * dim + 2 + (dim + 1) * integrated + (len(set(scene.viscosities)) > 1)
-    reals_seen = near + (WALL_SHARE * (2 * dim + 1) if scene.walls and not scene.periodic else 0.0)
+    wall_reals = 2 * dim + 1 + (scene.wall_planes > 1)
+    share = WALL_SHARE * scene.wall_planes * 2.0 / scene.support_ratio
+    reals_seen = near + (share * wall_reals if scene.walls and not scene.periodic else 0.0)
     return (
         size.particles * (real * reals + INTEGER * integers)
-        + (size.walls + _lining(scene, spacing)) * real * (2 * dim + 1)
+        + (size.walls + _lining(scene, spacing)) * real * wall_reals
         + size.blocks * per_block
         + nodes * real
         + (windows * real * reals_seen + INTEGER * resorting.integers(size.particles, size.blocks) if on_cpu else 0.0)
@@ -113,7 +115,7 @@ def _lining(scene: Scene, spacing: float | None) -> float:
         solid = make_solid(obstacle, scene.spacing, scene.domain)
         sides = [length / s + 1.0 for length in solid.upper - solid.lower]
         total += sum(2.0 * math.prod(sides[:d] + sides[d + 1 :]) for d in range(scene.dim))
-    return total
+    return total * scene.wall_planes
 
 
 def free_host_memory() -> float:
