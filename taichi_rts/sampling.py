@@ -233,7 +233,7 @@ def keep_outside(scene: Scene, solids: Sequence[Solid], x: np.ndarray) -> np.nda
 def line_obstacles(scene: Scene, solids: Sequence[Solid]) -> tuple[WallLayer, ...]:
     """Wall particles below the surface of each obstacle: at the depth and with the volume of `calibrate_walls`.
 
-    In as many layers as the domain's walls, where the body has room for them: those of one layer lie at least half a spacing
+    In as many layers as the domain's walls, where the body has room for them: those of one layer lie at least 0.8 spacings
     deeper than the layer before, so that none meets another from the other side.
 
     Where they are closer than in the domain's walls, or further apart, their volumes are less, or more (`layers.shares`), and
@@ -251,9 +251,13 @@ def line_obstacles(scene: Scene, solids: Sequence[Solid]) -> tuple[WallLayer, ..
     for k, solid in enumerate(solids):
         laid = [line_solid(solid, depth, s)]
         for plane in range(1, scene.wall_planes):
-            laid.append(line_solid(solid, depth + plane * s, s, least=depth + (plane - 0.5) * s))
+            laid.append(line_solid(solid, depth + plane * s, s, least=depth + (plane - 0.2) * s))
         x, normals = (np.concatenate(parts) for parts in zip(*laid, strict=True))
         inside = solid.distance(x)
+        if scene.wall_planes > 1:
+            lost = np.linalg.norm(normals, axis=1) < 0.5  # amid a thin body, where neither side is nearer: either will do
+            aside = 0.05 * s * np.array([1.0, 0.8, 0.6])[: scene.dim]
+            normals[lost] = solid.normals(x[lost] + aside, 0.01 * s)
         probes = x + (0.5 * s - inside)[:, None] * normals
         share = np.concatenate([shares(part, s) for part, _ in laid])
         volumes = even_out(kernel, x, volume * share, probes, seen)

@@ -109,14 +109,16 @@ class Walls:
 
         With (d_i + d_b)/d_i, d_i and d_b being the distances to the face, velocities go through zero on the face (Morris, Fox &
         Zhu 1997, Eq. 23), and a linear profile along a resting lattice feels no force, as it should. Bounded, because fluid
-        may come arbitrarily close: no nearer than d_b/3 counts, d_b being that of the plane next to the face.
+        may come arbitrarily close: no nearer than d_b/3 counts, d_b being that of the plane next to the face. And at least
+        once: a particle of an obstacle that faces away, round an edge or on a plate's other side, has the obstacle's speed.
         """
         distance = self.facing(k, b).dot(x_ib)
         depth, largest = self.depth, LARGEST_SHEAR
         if ti.static(self.layered):
             depth = self.depths[b]
             largest = 1.0 + (LARGEST_SHEAR - 1.0) / self.depth * depth
-        return ti.min(distance / ti.max(distance - depth, 1e-3 * depth), largest) / self.stiffness
+        ratio = ti.min(distance / ti.max(distance - depth, 1e-3 * depth), largest)
+        return ti.max(ratio, 1.0) / self.stiffness
 
 
 def make_wall_sum(
