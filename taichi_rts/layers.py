@@ -20,22 +20,27 @@ RANGE = 2.2
 """How far [spacings] neighbours count in a particle's share of the surface."""
 
 
-def line_solid(solid: Solid, depth: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+def line_solid(solid: Solid, depth: float, spacing: float, least: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Positions [m] and outward normals, (M, dim) both, of one layer of wall particles `depth` [m] below the surface of a solid.
 
     By the shape's own formula, if it has one. Else they are points of the surface, sunk until they reach the depth or meet
     those from the other side (a sharp edge, a thin plate), of which some are chosen at random, the deepest first, and evened
-    out (Lloyd 1982).
+    out (Lloyd 1982). Those that do not reach the depth `least` [m], if it is given, are left out; perhaps none is left.
     """
     if solid.even is not None:
         x = solid.even(depth, spacing)
+        if least > 0.0:
+            x = x[solid.distance(x) <= -least]
         return x, solid.normals(x, 0.1 * spacing)
     fine = spacing / FINE[len(solid.lower)]
     points = solid.surface(fine)
     normals = solid.normals(points, 0.1 * spacing)
     sunk = _sink(solid, points, normals, depth, spacing)
     points = points - sunk[:, None] * normals
-    some = _thin(points, sunk, fine, sunk >= BLUNT * sunk.max())
+    deep = sunk >= max(BLUNT * sunk.max(), least)
+    if not deep.any():
+        return points[:0], normals[:0]
+    some = _thin(points, sunk, fine, deep)
     points, normals, sunk = points[some], normals[some], sunk[some]
     chosen = _relax(points, _choose(points, sunk, spacing), SWEEPS[points.shape[1]])
     return points[chosen], normals[chosen]

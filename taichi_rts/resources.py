@@ -36,7 +36,7 @@ BLOCK_INTEGERS = {"uniform": 1, "regional": 9, "asynchronous": 8}
 FIXED = 1 << 14
 """Bytes of fields whose size does not depend on the scene, about."""
 WALL_SHARE = 0.45
-"""Entries of the windows on a wall at rest over those of the windows on the fluid, about."""
+"""Entries of the windows on a wall at rest over those of the windows on the fluid at r = 2s, about."""
 SOUND_REALS = 9
 """Fields of reals with an entry for each block that a regional sound speed needs."""
 MOST_ADDRESSED = 2**32 - 1
@@ -93,14 +93,16 @@ def buffer_bytes(
     steps_per_block = INTEGER * BLOCK_INTEGERS.get(stepper.name, max(BLOCK_INTEGERS.values()))
     nodes = sum(_nodes(scene, spacing))
     windows = entries(room(dim, (scene.support_ratio * (1.0 + 2.0 * stepper.drift)) ** dim))
-    reals_seen = near + (WALL_SHARE * (2 * dim + 1) if scene.walls and not scene.periodic else 0.0)
+    wall_reals = 2 * dim + 1 + (scene.wall_planes > 1)
+    share = WALL_SHARE * scene.wall_planes * 2.0 / scene.support_ratio
+    reals_seen = near + (share * wall_reals if scene.walls and not scene.periodic else 0.0)
     return {
         "the particles' state": size.particles * (real * reals + INTEGER * integers),
         "the particles' order": size.particles * INTEGER * 3,
         "the grid and what neighbours see": size.particles * real * near
         + size.blocks * per_block
         + (windows * real * reals_seen + INTEGER * resorting.integers(size.particles, size.blocks) if on_cpu else 0.0),
-        "walls": (size.walls + _lining(scene, spacing)) * real * (2 * dim + 1)
+        "walls": (size.walls + _lining(scene, spacing)) * real * wall_reals
         + size.particles * real * 2 * faces
         + size.blocks * walls_per_block,
         "the distances from obstacles": nodes * real,
@@ -132,7 +134,7 @@ def _lining(scene: Scene, spacing: float | None) -> float:
         solid = make_solid(obstacle, scene.spacing, scene.domain)
         sides = [length / s + 1.0 for length in solid.upper - solid.lower]
         total += sum(2.0 * math.prod(sides[:d] + sides[d + 1 :]) for d in range(scene.dim))
-    return total
+    return total * scene.wall_planes
 
 
 def free_host_memory() -> float:

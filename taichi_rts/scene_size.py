@@ -36,12 +36,14 @@ def size_of(scene: Scene, spacing: float | None = None) -> SceneSize:
     s = scene.spacing if spacing is None else spacing
     given = sum(fluid.count for fluid in scene.fluids if isinstance(fluid, Particles))
     volume = sum(fluid.volume for fluid in scene.fluids if not isinstance(fluid, Particles))
-    sides = [length / s + 2.0 for length in scene.domain.size]
-    faces = [
-        2.0 * math.prod(sides[:axis] + sides[axis + 1 :])
-        for axis, periodic in enumerate(scene.is_periodic)
-        if scene.walls and not periodic
-    ]
+    faces = []
+    for plane in range(scene.wall_planes if scene.walls else 0):
+        sides = [length / s + 2.0 * (plane + 1) for length in scene.domain.size]
+        faces += [
+            2.0 * math.prod(sides[:axis] + sides[axis + 1 :])
+            for axis, periodic in enumerate(scene.is_periodic)
+            if not periodic
+        ]
     return SceneSize(
         particles=given + volume / s**scene.dim + sum(_flowing_in(scene, inflow, s) for inflow in scene.inflows),
         walls=sum(faces),

@@ -182,7 +182,8 @@ class MomentumEquation:
         self.wall_pair = wall_pair
         self.moving = [wall for wall in walls if wall.moves]
         names = ["x", "v", "rho", "p_over_rho2", *(["viscosity"] if near.has_viscosity else [])]
-        wall_names = ["x", "volume", *(["normal"] if sideways else [])]
+        layered = any(wall.layered for wall in walls if not wall.moves)
+        wall_names = ["x", "volume", *(["normal"] if sideways else []), *(["depths"] if sideways and layered else [])]
         self.sum = NeighbourSum(fluid_pair, wall_pair, width, names, wall_names, near, grid, windows, walls, backend)
         self.wall_power = make_wall_sum(self.moving, grid, power_pair, 1, backend)
         """Power [W/kg] of moving walls on the particle at a place, (1,): their accelerations times their velocities."""

@@ -33,6 +33,7 @@ class Walls:
     moves = False
     transient = frozenset(
         {"x", "volume", "normal", "depth", "stiffness", "start", "near", "shift", "speed", "windows", "dtype"}
+        | {"depths", "layered"}
     )
 
     def __init__(self, layer: WallLayer, fluid: Neighbourhood, geometry: Geometry, backend: Backend) -> None:
@@ -52,6 +53,10 @@ class Walls:
         self.normal = vector_field(geometry.dim, backend.dtype, padded)
         self.depth = layer.depth
         self.stiffness = layer.stiffness
+        self.layered = bool((layer.depths != layer.depth).any())
+        if self.layered:
+            self.depths = ti.field(backend.dtype, padded)
+            self.depths.from_numpy(np.pad(layer.depths[order], (0, backend.lanes)).astype(backend.numpy_dtype))
         self.start = ti.field(ti.i32, geometry.cells + 1)
         self.near = ti.field(ti.i32, geometry.blocks)
         sorted_ = (values[order].astype(backend.numpy_dtype) for values in (positions, volumes, layer.normals))
@@ -74,6 +79,8 @@ class Walls:
         other = copy.copy(self)
         other.x, other.normal = (vector_field(self.geometry.dim, self.dtype, count) for _ in range(2))
         other.volume = ti.field(self.dtype, count)
+        if self.layered:
+            other.depths = ti.field(self.dtype, count)
         return other
 
     @ti.func
@@ -102,10 +109,16 @@ class Walls:
 
         With (d_i + d_b)/d_i, d_i and d_b being the distances to the face, velocities go through zero on the face (Morris, Fox &
         Zhu 1997, Eq. 23), and a linear profile along a resting lattice feels no force, as it should. Bounded, because fluid
-        may come arbitrarily close.
+        may come arbitrarily close: no nearer than d_b/3 counts, d_b being that of the plane next to the face. And at least
+        once: a particle of an obstacle that faces away, round an edge or on a plate's other side, has the obstacle's speed.
         """
         distance = self.facing(k, b).dot(x_ib)
-        return ti.min(distance / ti.max(distance - self.depth, 1e-3 * self.depth), LARGEST_SHEAR) / self.stiffness
+        depth, largest = self.depth, LARGEST_SHEAR
+        if ti.static(self.layered):
+            depth = self.depths[b]
+            largest = 1.0 + (LARGEST_SHEAR - 1.0) / self.depth * depth
+        ratio = ti.min(distance / ti.max(distance - depth, 1e-3 * depth), largest)
+        return ti.max(ratio, 1.0) / self.stiffness
 
 
 def make_wall_sum(

@@ -115,6 +115,33 @@ def test_walls_are_missing_on_periodic_axes_and_behind_inflows_and_know_who_move
     assert min(y for _, y in gone) > 1
 
 
+def test_wide_supports_have_as_many_planes_behind_every_face_but_the_inflows():
+    wide = {"support_ratio": 3.0, "kernel": "wendland_c2"}
+    layer, owners = line_walls(scene(moving_walls=[PISTON], **wide))
+    assert (owners == 0).sum() == 2 * 24  # it owns its edges
+    assert (layer.normals[owners == 0] == [1, 0]).all()
+    everywhere, _ = line_walls(scene(**wide))
+    layer, _ = line_walls(scene(inflows=[JET], **wide))
+    gone = set(map(tuple, everywhere.positions.round(9))) - set(map(tuple, layer.positions.round(9)))
+    assert {x for x, _ in gone} == {0.375, 0.425, 0.475, 0.525}
+    assert len(gone) == 2 * 4
+    layer, _ = line_walls(scene(periodic=("x",), **wide))
+    assert len(layer.positions) == 2 * 2 * 20
+
+
+@pytest.mark.parametrize("density", ["summation", "continuity"])
+def test_a_face_that_may_move_pushes_as_one_at_rest(simulate, density):
+    """With several planes, and friction on them."""
+    medium = {"support_ratio": 3.0, "kernel": "wendland_c2", "kinematic_viscosity": 0.01, "density": density}
+    slid = rts.Block((0, 0), (0.5, 0.4), velocity=(0.3, -0.5))
+    pushes = []
+    for walls in ([], [rts.MovingWall("x-", (5, 6), (0, 0.1)), rts.MovingWall("y-", (5, 6), (0, 0.1))]):
+        sim = simulate(scene(fluids=[slid], moving_walls=walls, sound_speed=20.0, **medium), rts.Uniform())
+        pushes.append(sim.particles.to_numpy(sim.particles.a))
+    assert np.abs(pushes[0]).max() > 20.0
+    np.testing.assert_allclose(pushes[1], pushes[0], rtol=1e-9, atol=1e-9)
+
+
 def test_fluid_may_start_under_its_own_weight():
     pool = scene(hydrostatic=True, gravity=(0, -10))
     x, rho = compress(pool, POOL, np.array([[0.5, 0.0], [0.5, 0.4], [0.5, 0.2]]))
@@ -276,6 +303,8 @@ def test_walls_do_not_let_fluid_slip(simulate):
     quiet = {"gravity": (0, 0), "artificial_viscosity": 0.0, "sound_speed": 20.0}
     for density, ratio, kernel, most in (
         ("continuity", 2.0, "cubic_spline", 1e-8),
+        ("continuity", 3.0, "wendland_c2", 1e-8),
+        ("summation", 4.0, "wendland_c2", 0.02),
         ("summation", 2.5, "wendland_c2", 0.02),
     ):
         flow = rts.LinearField(((0, 1), (0, 0)))

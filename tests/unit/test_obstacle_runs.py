@@ -82,6 +82,21 @@ def test_water_at_rest_lifts_obstacles_by_what_they_displace(simulate):
         rts.Simulation.obstacle_forces(type("Bare", (), {"scene": pool.replace(obstacles=())})())
 
 
+@pytest.mark.parametrize("ratio", [2.0, 3.0])
+def test_friction_slows_down_what_passes_an_edge_or_a_thin_plate(simulate, ratio):
+    plates = (rts.BoxObstacle((0.2, 0.4), (0.5, 0.48)), rts.BoxObstacle((0.6, 0.3), (0.9, 0.6)))
+    stream = rts.Block((0, 0), (1, 1), velocity=(1.0, 0.0))
+    rates = []
+    for nu in (0.0, 0.01):
+        medium = {"kinematic_viscosity": nu, "support_ratio": ratio, "kernel": "wendland_c2", "artificial_viscosity": 0.0}
+        scene = rts.Scene(UNIT, (stream,), 0.04, sound_speed=20.0, gravity=(0, 0), obstacles=plates, **medium)
+        sim = simulate(scene, rts.Uniform())
+        rates.append(sim.particles.to_numpy(sim.particles.a)[:, 0])
+    friction = rates[1] - rates[0]
+    assert friction.max() < 1e-9
+    assert -60.0 < friction.min() < -10.0  # nu u / s^2 is 6.25
+
+
 @pytest.mark.slow
 def test_a_body_pushes_with_the_work_that_is_counted(simulate):
     ram = rts.BoxObstacle((0.1, 0.06), (0.3, 0.94), motion=rts.Keyframes((0.05, 0.25), ((0, 0), (0.2, 0))))

@@ -173,6 +173,9 @@ SOLIDS = {
 }
 
 
+CORNER = {dim: rts.Block((0,) * dim, (0.1,) * dim) for dim in (2, 3)}
+
+
 @pytest.mark.parametrize("name", SOLIDS)
 def test_geometry_and_wall_particles(name):
     obstacle, volume = SOLIDS[name]
@@ -208,16 +211,55 @@ def density(made, x):
     return rho
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-def test_fluid_rests_on_a_box_as_on_a_wall(dim):
+@pytest.mark.parametrize(("dim", "ratio"), [(2, 2.0), (3, 2.0), (2, 3.0), (3, 2.6)])
+def test_fluid_rests_on_a_box_as_on_a_wall(dim, ratio):
     whole = rts.BoxObstacle((0,) * dim, (1, 0.32, 1)[:dim])
-    raised = scene(dim, obstacles=[whole])
+    raised = scene(dim, obstacles=[whole], support_ratio=ratio, kernel="wendland_c2")
     resting, corner = np.full((1, dim), 0.5), np.full((1, dim), 0.5)
     resting[0, 1] = corner[0, 1] = 0.34
     corner[0, 0] = 0.02
     assert sample(raised).positions[:, 1].min() == pytest.approx(0.34)
     assert density(raised, resting) == pytest.approx(1000.0, rel=1e-6)
     assert density(raised, corner) == pytest.approx(1000.0, rel=0.01)
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_wide_supports_lay_more_layers_where_the_body_has_room(name):
+    obstacle, _ = SOLIDS[name]
+    if obstacle.shape == "mesh":
+        pytest.importorskip("trimesh")
+    solid = make_solid(obstacle, S)
+    dim = len(solid.lower)
+    medium = {"support_ratio": 4.0, "kernel": "wendland_c2", "density": "continuity"}
+    made = scene(dim, obstacles=[obstacle], fluids=[CORNER[dim]], **medium)
+    (layer,) = sample(made).obstacles
+    depth, _ = calibrate_walls(made)
+    deep = -solid.distance(layer.positions)
+    np.testing.assert_allclose(layer.depths, np.minimum(deep, made.support), rtol=1e-12)
+    first = layer.depths < depth + 0.49 * S
+    assert 0.1 < (~first).sum() / first.sum() < 2.0
+    gaps = np.sqrt(((layer.positions[~first, None] - layer.positions[first]) ** 2).sum(axis=2))
+    assert gaps.min() > 0.45 * S
+    assert (layer.volumes > 0).all()
+
+
+@pytest.mark.parametrize(("thickness", "rows"), [(1.0, 1), (2.0, 2), (2.5, 2), (3.0, 3), (4.0, 4), (8.0, 4)])
+def test_no_layer_of_a_plate_pokes_through_its_other_side(thickness, rows):
+    """Each side has a row, and a second one behind it, where there is room."""
+    half = 0.5 * thickness * S
+    plate = rts.BoxObstacle((0.2, 0.5 - half), (0.8, 0.5 + half))
+    made = scene(support_ratio=3.0, kernel="wendland_c2", density="continuity", obstacles=[plate])
+    (layer,) = sample(made).obstacles
+    assert make_solid(plate, S).distance(layer.positions).max() < -0.4 * S
+    middle = np.abs(layer.positions[:, 0] - 0.5) < 0.2
+    assert len(np.unique(layer.positions[middle, 1].round(6))) == rows
+    resting = np.array([[0.5, 0.5 + half + 0.5 * S], [0.5, 0.5 - half - 0.5 * S]])
+    kernel = make_kernel(made.kernel, 2, made.support)
+    steps = S * np.arange(-3, 4)
+    seen = kernel.sample(np.linalg.norm(resting[:, None] - layer.positions, axis=2)) @ layer.volumes
+    depth, volume = calibrate_walls(made)
+    flat = volume * sum(kernel.sample(np.hypot(steps, 0.5 * S + depth + k * S)).sum() for k in range(2))
+    np.testing.assert_allclose(seen, flat, rtol=0.05)
 
 
 def test_fluid_keeps_half_a_spacing_from_an_obstacle_and_sees_a_whole_surface():

@@ -8,7 +8,14 @@ from taichi_rts.smoothing import make_kernel
 S = 0.1
 mediums = pytest.mark.parametrize(
     ("kernel", "dim", "ratio"),
-    [("cubic_spline", 2, 2.0), ("cubic_spline", 3, 2.0), ("wendland_c2", 2, 2.0), ("wendland_c2", 3, 3.0)],
+    [
+        ("cubic_spline", 2, 2.0),
+        ("cubic_spline", 3, 2.0),
+        ("wendland_c2", 2, 2.0),
+        ("wendland_c2", 3, 3.0),
+        ("cubic_spline", 3, 2.6),
+        ("wendland_c2", 2, 4.0),
+    ],
 )
 
 
@@ -54,6 +61,40 @@ def test_walls_complete_the_density_exactly(kernel, dim, ratio):
     resting[0, 1] = 0.5 * S
     scene = filled(dim, kernel=kernel, support_ratio=ratio)
     assert density(scene, resting, with_walls=True) == pytest.approx(1000.0, rel=1e-9)
+
+
+@mediums
+def test_the_walls_density_falls_off_more_steeply_than_the_lattices(kernel, dim, ratio):
+    """By 4/3 at r = 2s, and by as much more as the support is wider."""
+    scene = filled(dim, kernel=kernel, support_ratio=ratio)
+    probes = np.full((2, dim), 0.45)
+    probes[:, 1] = 0.5 * S + np.array([-1e-5, 1e-5]) * S
+    walls = density(scene, probes, with_walls=True) - density(scene, probes, with_walls=False)
+    steps = S * np.arange(-4, 5)
+    sides = np.stack(np.meshgrid(*[steps] * (dim - 1)), axis=-1).reshape(-1, dim - 1)
+    smooth, mass = make_kernel(kernel, dim, scene.support), sample(scene).mass
+
+    def missing(y):
+        planes = [mass * smooth.sample(np.sqrt((sides**2).sum(axis=1) + (y + (k + 0.5) * S) ** 2)) for k in range(4)]
+        return np.sum(planes)
+
+    lattice = missing(probes[1, 1]) - missing(probes[0, 1])
+    assert (walls[1] - walls[0]) / lattice == pytest.approx(4 / 3 * ratio / 2, rel=1e-4)
+
+
+@pytest.mark.parametrize(("dim", "ratio"), [(2, 2.0), (3, 2.6), (2, 3.0), (2, 4.0)])
+def test_integrated_densities_see_the_whole_lattice_continued_in_corners_too(dim, ratio):
+    scene = filled(dim, kernel="wendland_c2", support_ratio=ratio, density="continuity")
+    corner = np.full((1, dim), 0.5 * S)
+    assert density(scene, corner, with_walls=True) == pytest.approx(1000.0, rel=1e-9)
+    layer, _ = line_walls(scene)
+    planes = {2.0: 1, 2.6: 2, 3.0: 2, 4.0: 3}[ratio]
+    assert len(layer.positions) == (10 + 2 * planes) ** dim - 10**dim
+    assert len(np.unique(layer.positions.round(9), axis=0)) == len(layer.positions)
+    outside = np.where(layer.normals > 0, -layer.positions, np.where(layer.normals < 0, layer.positions - 1.0, 0.0))
+    np.testing.assert_allclose(outside.sum(axis=1), layer.depths, rtol=1e-12)
+    assert set(layer.depths.round(9)) == {round((k + 0.5) * S, 9) for k in range(planes)}
+    assert layer.depths.max() < scene.support  # so that none lies beyond the grid's margin
 
 
 def wall_particles(scene):

@@ -60,6 +60,10 @@ def write(folder, text, name="my_scene.toml"):
         ({"kernel": "gauss"}, ["kernel", "cubic_spline", "wendland_c2", "gauss"]),
         ({"density": "guess"}, ["density", "summation", "continuity", "guess"]),
         ({"support_ratio": 5}, ["support_ratio", "less than or equal to 4", "5"]),
+        (
+            {"support_ratio": 3, "density": "continuity"},
+            ["support_ratio: 3 with kernel 'cubic_spline'", "at most 2.75", "'wendland_c2'"],
+        ),
         ({"artificial_viscosity": -1}, ["artificial_viscosity", "greater than or equal to 0", "-1"]),
         ({"rest_density": 0}, ["rest_density", "greater than 0", "0"]),
         ({"gravity": (0, 0, -9.81)}, ["gravity (0.0, 0.0, -9.81) has 3 components; the domain has 2"]),

@@ -142,7 +142,7 @@ def wall_beside(dim):
     x = np.stack(np.meshgrid(*[np.arange(LOWER + 0.02, UPPER, 0.06)] * dim), axis=-1).reshape(-1, dim)
     x[:, -1] = LOWER - 0.05
     x = np.unique(x, axis=0)
-    return WallLayer(x, np.zeros_like(x), np.linspace(1.0, 2.0, len(x)), 0.05, 1.0)
+    return WallLayer(x, np.zeros_like(x), np.linspace(1.0, 2.0, len(x)), np.full(len(x), 0.05), 0.05, 1.0)
 
 
 def check(sums, every=1):
