@@ -158,7 +158,7 @@ class Run:
         if self.gui:
             from taichi_rts.rendering.live import watch  # only here, because it needs Vulkan and a display
 
-            start = lambda: rts.init(self.arch, self.precision or "f32")  # noqa: E731
+            start = lambda: rts.init(self.arch, self.precision or "f32", restart=True)  # noqa: E731
             watch(scene, stepper, self.picture(), start, self.output_dir)
             return
         self.record(scene, panels)
@@ -200,7 +200,7 @@ class Run:
         for panel in panels:
             make_cameras(scene, dataclasses.replace(self.picture(), **panel.options))
         with Interrupts() as interrupts:
-            device = rts.init(self.arch, self.precision or "f32")
+            device = rts.init(self.arch, self.precision or "f32", restart=True)
             with Recorder(
                 scene, panels, self.picture(), recording, debug=self.debug, checkpoint=checkpoint
             ) as recorder:
