@@ -270,7 +270,9 @@ class RegionalSchedule(Schedule):
     @ti.func
     def add(self, counts: ti.template(), level, count):
         """Add `count` to what is counted of `level`."""
-        row = ti.global_thread_idx() if ti.static(self.grid.serial) else 0
+        row = 0
+        if ti.static(self.grid.serial):  # a statement: of an expression both sides would be compiled
+            row = ti.global_thread_idx()
         counts.add(row * self.width + level, count)
 
     @ti.func
