@@ -255,7 +255,9 @@ def line_obstacles(scene: Scene, solids: Sequence[Solid]) -> tuple[WallLayer, ..
         x, normals = (np.concatenate(parts) for parts in zip(*laid, strict=True))
         inside = solid.distance(x)
         if scene.wall_planes > 1:
-            lost = np.linalg.norm(normals, axis=1) < 0.5  # amid a thin body, where neither side is nearer: either will do
+            lost = (
+                np.linalg.norm(normals, axis=1) < 0.5
+            )  # amid a thin body, where neither side is nearer: either will do
             aside = 0.05 * s * np.array([1.0, 0.8, 0.6])[: scene.dim]
             normals[lost] = solid.normals(x[lost] + aside, 0.01 * s)
         probes = x + (0.5 * s - inside)[:, None] * normals
