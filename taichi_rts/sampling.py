@@ -214,7 +214,8 @@ def line_walls(scene: Scene) -> tuple[WallLayer, np.ndarray]:
         behind = positions[-1][:, axis] < scene.domain.lower[axis]
         normals.append(np.where(behind, 1.0, -1.0)[:, None] * np.eye(scene.dim)[axis])
         owners.append(np.where(behind, numbers.get(AXES[axis] + "-", -1), numbers.get(AXES[axis] + "+", -1)))
-    layer = WallLayer(*map(np.concatenate, (positions, normals, volumes, deep)), depth, wall_stiffness(scene))
+    x, n, v, d = (np.concatenate(parts) for parts in (positions, normals, volumes, deep))
+    layer = WallLayer(x, n, v, d, depth, wall_stiffness(scene))
     behind_patches = np.zeros(len(layer.positions), bool)
     for inflow in scene.inflows:
         reach = np.where(np.arange(scene.dim) == inflow.axis, depths[-1] + 0.5 * depth, 0.5 * s)
@@ -255,7 +256,9 @@ def line_obstacles(scene: Scene, solids: Sequence[Solid]) -> tuple[WallLayer, ..
         x, normals = (np.concatenate(parts) for parts in zip(*laid, strict=True))
         inside = solid.distance(x)
         if scene.wall_planes > 1:
-            lost = np.linalg.norm(normals, axis=1) < 0.5  # amid a thin body, where neither side is nearer: either will do
+            lost = (
+                np.linalg.norm(normals, axis=1) < 0.5
+            )  # amid a thin body, where neither side is nearer: either will do
             aside = 0.05 * s * np.array([1.0, 0.8, 0.6])[: scene.dim]
             normals[lost] = solid.normals(x[lost] + aside, 0.01 * s)
         probes = x + (0.5 * s - inside)[:, None] * normals
@@ -264,7 +267,7 @@ def line_obstacles(scene: Scene, solids: Sequence[Solid]) -> tuple[WallLayer, ..
         depths = np.full(len(x), depth) if scene.wall_planes == 1 else np.minimum(-inside, scene.support)
         layer = WallLayer(x, normals, volumes, depths, depth, wall_stiffness(scene))
         if at_rest[k]:
-            kept = ((x >= scene.domain.lower) & (x <= scene.domain.upper)).all(axis=1)
+            kept = np.asarray(((x >= scene.domain.lower) & (x <= scene.domain.upper)).all(axis=1))
             for other, its in zip(solids[:k], at_rest, strict=False):
                 if its:
                     kept &= other.distance(x) > -0.99 * depth

@@ -150,11 +150,11 @@ class Scene:
 
     @property
     def wall_planes(self) -> int:
-        """How many planes of wall particles lie behind a face: as many as the lattice they replace has in reach of a resting layer.
+        """How many planes of wall particles lie behind a face: as many as the lattice has there in reach of a resting layer.
 
-        Its planes lie s, 2s, ... from the layer that rests half a spacing from the face, and those nearer than r count: one up
-        to r = 2s, two up to 3s, three up to 4s. One plane that has their density and slope in a lattice at rest will not do: a
-        still pool at r = 3s falls through it (docs/validation.md).
+        The lattice's planes lie s, 2s, ... from the layer that rests half a spacing from the face, and those nearer than r count:
+        one up to r = 2s, two up to 3s, three up to 4s. One plane that has their density and slope in a lattice at rest will
+        not do: a still pool at r = 3s falls through it (docs/validation.md).
         """
         return math.ceil(self.support_ratio - 1e-9) - 1
 

@@ -138,7 +138,7 @@ def test_a_face_that_may_move_pushes_as_one_at_rest(simulate, density):
     for walls in ([], [rts.MovingWall("x-", (5, 6), (0, 0.1)), rts.MovingWall("y-", (5, 6), (0, 0.1))]):
         sim = simulate(scene(fluids=[slid], moving_walls=walls, sound_speed=20.0, **medium), rts.Uniform())
         pushes.append(sim.particles.to_numpy(sim.particles.a))
-    assert np.abs(pushes[0]).max() > 20.0
+    assert np.abs(pushes[0][:, 0]).max() > 3.0
     np.testing.assert_allclose(pushes[1], pushes[0], rtol=1e-9, atol=1e-9)
 
 

@@ -88,7 +88,12 @@ def test_friction_slows_down_what_passes_an_edge_or_a_thin_plate(simulate, ratio
     stream = rts.Block((0, 0), (1, 1), velocity=(1.0, 0.0))
     rates = []
     for nu in (0.0, 0.01):
-        medium = {"kinematic_viscosity": nu, "support_ratio": ratio, "kernel": "wendland_c2", "artificial_viscosity": 0.0}
+        medium = {
+            "kinematic_viscosity": nu,
+            "support_ratio": ratio,
+            "kernel": "wendland_c2",
+            "artificial_viscosity": 0.0,
+        }
         scene = rts.Scene(UNIT, (stream,), 0.04, sound_speed=20.0, gravity=(0, 0), obstacles=plates, **medium)
         sim = simulate(scene, rts.Uniform())
         rates.append(sim.particles.to_numpy(sim.particles.a)[:, 0])
