@@ -6,7 +6,7 @@ Takes every option of `taichi-rts run`, e.g. --arch cuda --particles 300k --step
 
 from pathlib import Path
 
-from taichi_rts.cli import run_demo
+from taichi_rts.commands.main import run_demo
 
 SCENE = "dam_break"
 STEPPER = "asynchronous"

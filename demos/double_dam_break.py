@@ -3,7 +3,7 @@
 Takes every option of `taichi-rts run`, e.g. --arch cuda --particles 1.5M --panels figure3.
 """
 
-from taichi_rts.cli import run_demo
+from taichi_rts.commands.main import run_demo
 
 SCENE = "double_dam_break"
 EXPORT_FPS = 60.0  # frames per second of physical time

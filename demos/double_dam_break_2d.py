@@ -3,7 +3,7 @@
 Takes every option of `taichi-rts run`, e.g. --arch cuda --particles 300k --stepper uniform.
 """
 
-from taichi_rts.cli import run_demo
+from taichi_rts.commands.main import run_demo
 
 SCENE = "double_dam_break_2d"
 EXPORT_FPS = 60.0  # frames per second of physical time

@@ -3,7 +3,7 @@
 Takes every option of `taichi-rts run`, e.g. --arch cuda --particles 300k --stepper uniform.
 """
 
-from taichi_rts.cli import run_demo
+from taichi_rts.commands.main import run_demo
 
 SCENE = "torricelli"
 EXPORT_FPS = 20.0  # frames per second of physical time

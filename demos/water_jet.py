@@ -3,7 +3,7 @@
 Takes every option of `taichi-rts run`, e.g. --arch cuda --particles 1M --stepper asynchronous --colour-by level.
 """
 
-from taichi_rts.cli import run_demo
+from taichi_rts.commands.main import run_demo
 
 SCENE = "water_jet"
 SOUND_SPEED = "regional"

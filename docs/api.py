@@ -23,7 +23,7 @@ MODULES = (
     "taichi_rts",
     "taichi_rts.rendering.painter",
     "taichi_rts.compare",
-    "taichi_rts.stability.diagnosis",
+    "taichi_rts.readings.diagnosis",
     "taichi_rts.errors",
 )
 """What the docs tell people to import; of a module with `__all__` only what that names."""

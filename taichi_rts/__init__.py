@@ -1,9 +1,10 @@
 """Spatially varying time stepping for weakly compressible SPH, on Taichi. Importing starts nothing; call `init`."""
 
+from taichi_rts.device.backend import init  # first: it keeps Taichi from printing its banner
+
+# isort: split
 from taichi_rts import importing  # noqa: F401  first, as Ctrl-C may come while the others are imported
-from taichi_rts.backend import init
-from taichi_rts.conditions import GravityChange, Inflow, MovingWall, Outlet
-from taichi_rts.diagnostics import Energy
+from taichi_rts.assembly.handover import change_stepper
 from taichi_rts.errors import (
     BackendError,
     CheckpointError,
@@ -16,9 +17,15 @@ from taichi_rts.errors import (
     StepperError,
     TimeError,
 )
-from taichi_rts.fields import LinearField, StandingWave, TaylorGreen
-from taichi_rts.handover import change_stepper
-from taichi_rts.obstacles import (
+from taichi_rts.medium.energy import Energy
+from taichi_rts.output.checkpoint import load_checkpoint, save_checkpoint
+from taichi_rts.output.export import Exporter, write_particles
+from taichi_rts.output.series import Series
+from taichi_rts.particle_files.formats import read_particles
+from taichi_rts.particle_files.frame import ParticleFrame
+from taichi_rts.scene.loading import load_scene, scene_names, scene_schema
+from taichi_rts.scene.parts.conditions import GravityChange, Inflow, MovingWall, Outlet
+from taichi_rts.scene.parts.obstacles import (
     BoxObstacle,
     ConstantMotion,
     CylinderObstacle,
@@ -27,20 +34,17 @@ from taichi_rts.obstacles import (
     PolygonObstacle,
     SphereObstacle,
 )
-from taichi_rts.output.checkpoint import load_checkpoint, save_checkpoint
-from taichi_rts.output.export import Exporter, write_particles
-from taichi_rts.output.series import Series
-from taichi_rts.particle_files.formats import read_particles
-from taichi_rts.particle_files.frame import ParticleFrame
-from taichi_rts.particle_fluid import Particles
-from taichi_rts.probes import Gauge, Probe
-from taichi_rts.scene import Scene, View, load_scene, scene_names, scene_schema
-from taichi_rts.shapes import Block, Box, Sphere
+from taichi_rts.scene.parts.particles import Particles
+from taichi_rts.scene.parts.probes import Gauge, Probe
+from taichi_rts.scene.parts.shapes import Block, Box, Sphere
+from taichi_rts.scene.parts.sound import RegionalSound
+from taichi_rts.scene.parts.velocities import LinearField, StandingWave, TaylorGreen
+from taichi_rts.scene.parts.view import View
+from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
-from taichi_rts.sound import RegionalSound
-from taichi_rts.stepping.asynchronous import Asynchronous
-from taichi_rts.stepping.regional import Regional
-from taichi_rts.stepping.uniform import Uniform
+from taichi_rts.solver.stepping.asynchronous import Asynchronous
+from taichi_rts.solver.stepping.regional import Regional
+from taichi_rts.solver.stepping.uniform import Uniform
 
 __version__ = "0.1.0"
 __all__ = [

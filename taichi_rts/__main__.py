@@ -1,5 +1,5 @@
 """`python -m taichi_rts` is `taichi-rts`."""
 
-from taichi_rts.cli import main
+from taichi_rts.commands.main import main
 
 main()

@@ -13,70 +13,41 @@ import numpy as np
 import taichi as ti
 from PIL import Image
 
-from taichi_rts import backend as backends
-from taichi_rts.bodies import bodies
-from taichi_rts.diagnostics import Energy, Overhead, Tally, measure_energy
+from taichi_rts.assembly.build import DENSITIES
+from taichi_rts.assembly.frame_times import frame_times
+from taichi_rts.assembly.inventory import parts
+from taichi_rts.assembly.obstacle_forces import ForceMeter, ObstacleForces
+from taichi_rts.assembly.resources import require
+from taichi_rts.assembly.walls import make_keepers, make_walls
+from taichi_rts.assembly.work import Overhead, Tally
+from taichi_rts.device import backend as backends
+from taichi_rts.device.ownership import guarded
 from taichi_rts.errors import Error, Interrupted, SimulationDivergedError, TimeError
-from taichi_rts.frames import frame_times
-from taichi_rts.grid import BlockGrid, Geometry
-from taichi_rts.inflow import Inflows
-from taichi_rts.motion import Motion
-from taichi_rts.outlet import Outlets
-from taichi_rts.ownership import guarded
-from taichi_rts.particles import Neighbourhood, Particles
-from taichi_rts.physics.continuity import ContinuityDensity, DensityDiffusion, MirroredPressure
-from taichi_rts.physics.density import SummationDensity
-from taichi_rts.physics.floating_reference import FloatingReference
-from taichi_rts.physics.forces import ForceMeter, ObstacleForces
-from taichi_rts.physics.medium import Medium
-from taichi_rts.physics.momentum import Gravity, MomentumEquation, Pressure
-from taichi_rts.physics.moving_walls import MovingFace
-from taichi_rts.physics.obstacles import Keeper, MovingBody
-from taichi_rts.physics.sound_rule import SoundRule
-from taichi_rts.physics.timetable import Ticking
-from taichi_rts.physics.viscosity import viscosity_terms
-from taichi_rts.physics.walls import Walls
-from taichi_rts.placing import at_origin, origin_of
-from taichi_rts.resources import require
-from taichi_rts.sampling import Sample, sample
-from taichi_rts.scene import Scene
-from taichi_rts.solids import distance_grid, make_solid
-from taichi_rts.state import parts
-from taichi_rts.stepping.base import Stepper
-from taichi_rts.stepping.regional import Regional
-from taichi_rts.windows import FluidWindows, WallWindows
+from taichi_rts.medium.energy import Energy, measure_energy
+from taichi_rts.medium.medium import Medium
+from taichi_rts.sampling.sampling import sample
+from taichi_rts.scene.placing import at_origin, origin_of
+from taichi_rts.scene.scene import Scene
+from taichi_rts.solver.grid.geometry import Geometry
+from taichi_rts.solver.grid.grid import BlockGrid
+from taichi_rts.solver.grid.windows import FluidWindows, WallWindows
+from taichi_rts.solver.motion.inflow import Inflows
+from taichi_rts.solver.motion.motion import Motion
+from taichi_rts.solver.motion.outlet import Outlets
+from taichi_rts.solver.particles.neighbourhood import Neighbourhood
+from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.physics.continuity import DensityDiffusion, MirroredPressure
+from taichi_rts.solver.physics.momentum import Gravity, MomentumEquation, Pressure
+from taichi_rts.solver.physics.timetable import Ticking
+from taichi_rts.solver.physics.viscosity import viscosity_terms
+from taichi_rts.solver.sound.floating_reference import FloatingReference
+from taichi_rts.solver.sound.rule import SoundRule
+from taichi_rts.solver.stepping.base import Stepper
+from taichi_rts.solver.stepping.regional import Regional
 
 REORDER_EVERY = 32  # sorts between moving the state itself into the grid's order, for locality only
 
 OnFrame = Callable[["Simulation"], object]
-
-DENSITIES: dict[str, Any] = {"summation": SummationDensity, "continuity": ContinuityDensity}
-
-
-def make_walls(
-    scene: Scene, start: Sample, near: Neighbourhood, grid: BlockGrid, backend: backends.Backend
-) -> list[Any]:
-    """Return the walls and obstacles at rest as one, if there are any, and each moving face and obstacle."""
-    geometry, moving_bodies = grid.geometry, bodies(scene)
-    at_rest = [layer for layer, body in zip(start.obstacles, scene.obstacles, strict=True) if body.motion is None]
-    layers = [start.walls.choose(start.owners == number) for number in range(len(scene.moving_walls))]
-    rest = start.walls.choose(start.owners == -1)
-    if at_rest:
-        rest = rest.joined(at_rest)
-    still: list[Any] = [Walls(rest, near, geometry, backend)] if len(rest.positions) else []
-    moving = zip(scene.moving_walls, layers, strict=True)
-    faces = [MovingFace(wall, layer, near, geometry, backend) for wall, layer in moving]
-    turning = [
-        MovingBody(body, start.obstacles[body.number], near, grid, scene.support, backend) for body in moving_bodies
-    ]
-    return still + faces + turning
-
-
-def make_keepers(scene: Scene, geometry: Geometry) -> list[Keeper]:
-    """Return what keeps centres out of each obstacle."""
-    moving = {body.number: body for body in bodies(scene)}
-    solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
-    return [Keeper(distance_grid(solid, scene.spacing), geometry, moving.get(k)) for k, solid in enumerate(solids)]
 
 
 @guarded("time", "count", "removed_count", "keeps_work", "keeps_momentum_budget")
@@ -282,7 +253,7 @@ class Simulation:
         That is: a state is not finite, speeds or accelerations had to be limited, or a density is not between 0.02 and 2 of
         rest. It reads the state, so it is for once in a while; `advance_to` itself notices only what is not finite.
         """
-        from taichi_rts.stability.diagnosis import diagnose  # only here, as it reads simulations
+        from taichi_rts.readings.diagnosis import diagnose  # only here, as it reads simulations
 
         if (found := diagnose(self)) is not None:
             raise SimulationDivergedError(f"blown up: {found}")

@@ -5,7 +5,7 @@ import pytest
 import taichi as ti
 
 import taichi_rts as rts
-from taichi_rts import backend
+from taichi_rts.device import backend
 
 QUICK = {"advanced_optimization": False}
 """Compiles a quarter faster. Not where bits of different kernels are compared."""

@@ -1,8 +1,9 @@
 """`python -m taichi_rts.benchmarks`."""
 
-import sys
+import tyro
 
-from taichi_rts.cli import main
+from taichi_rts.benchmarks.command import Bench
+from taichi_rts.terminal import execute
 
 if __name__ == "__main__":
-    main(["bench", *sys.argv[1:]])
+    execute(tyro.cli(Bench, prog="taichi-rts bench"))

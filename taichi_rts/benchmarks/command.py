@@ -15,9 +15,9 @@ from taichi_rts.benchmarks import peers
 from taichi_rts.benchmarks.device import device
 from taichi_rts.benchmarks.plot import draw
 from taichi_rts.benchmarks.rows import ROWS, Row, Settings, profile
-from taichi_rts.compare.plot import require_plots
 from taichi_rts.errors import Error
-from taichi_rts.output.files import write_bytes, write_json
+from taichi_rts.files.writing import write_bytes, write_json
+from taichi_rts.trials.plotting import require_plots
 
 PARTS = {**ROWS, "device": device}
 

@@ -5,7 +5,7 @@ import math
 import taichi as ti
 
 import taichi_rts as rts
-from taichi_rts.state import State
+from taichi_rts.assembly.inventory import State
 
 BYTES = {ti.f32: 4, ti.f64: 8, ti.i32: 4}
 

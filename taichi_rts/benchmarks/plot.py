@@ -6,7 +6,7 @@ import io
 from collections.abc import Sequence
 
 from taichi_rts.benchmarks.rows import Row
-from taichi_rts.compare.plot import MARKERS, PALETTE
+from taichi_rts.trials.plotting import MARKERS, PALETTE
 
 
 def draw(rows: Sequence[Row]) -> bytes:

@@ -20,7 +20,7 @@ import taichi_rts as rts
 from taichi_rts.benchmarks import peers, timing
 from taichi_rts.benchmarks.memory import memory_of
 from taichi_rts.benchmarks.scenes import FRONT_TIME, peers_dam_break
-from taichi_rts.stepping.regional import LARGEST_COURANT
+from taichi_rts.solver.stepping.regional import LARGEST_COURANT
 
 SETTLED = 0.05  # [s]: the column has left its lattice
 

@@ -16,12 +16,14 @@ import tyro
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 import taichi_rts as rts
-from taichi_rts.compare import analysis, executors, folder, plot, references, sweeps, table
+from taichi_rts.compare import analysis, folder, references, sweeps, table
 from taichi_rts.compare.measures import PARTED
 from taichi_rts.compare.runner import COURANTS, Settings, compare, plan
 from taichi_rts.errors import Error
-from taichi_rts.report import console
-from taichi_rts.scene import Scene
+from taichi_rts.scene.scene import Scene
+from taichi_rts.terminal import console
+from taichi_rts.trials import executors
+from taichi_rts.trials.plotting import require_plots
 
 DEFAULT_PARTICLES = {2: 500, 3: 1000}
 """By dimension: what a comparison with the default sweep does in about five minutes on two cores."""
@@ -94,7 +96,7 @@ class Compare:
     def __call__(self) -> None:
         """Run it."""
         if self.plot:
-            plot.require_plots()
+            require_plots()
         scene, settings = self.load(), self.settings()
         _, variants = plan(scene, settings)  # what cannot be built is said before anything runs or is written
         where = self.output_dir if self.output_dir is not None else Path("out") / "compare" / scene.name

@@ -8,7 +8,7 @@ from typing import Any
 
 from taichi_rts.compare import plot, table
 from taichi_rts.errors import OutputError
-from taichi_rts.output.files import remove, require_folder, require_writable, write_bytes, write_json
+from taichi_rts.files.writing import remove, require_folder, require_writable, write_bytes, write_json
 
 ARTEFACTS = ("compare.json", "compare.csv", "work_precision.png", "runs")
 

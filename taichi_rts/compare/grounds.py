@@ -8,7 +8,7 @@ from typing import Any
 
 from taichi_rts.compare.measures import Yardstick, front_position, judge
 from taichi_rts.compare.trajectory import Trajectory
-from taichi_rts.scene import Scene
+from taichi_rts.scene.scene import Scene
 
 
 @dataclasses.dataclass

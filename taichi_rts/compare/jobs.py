@@ -10,15 +10,16 @@ from typing import Any, cast
 import numpy as np
 
 import taichi_rts as rts
-from taichi_rts.compare.memory import peak_memory, reset_peak_memory
+from taichi_rts.assembly.rewind import Rewind
+from taichi_rts.assembly.work import speedup_bound
 from taichi_rts.compare.trajectory import Trajectory
-from taichi_rts.diagnostics import speedup_bound
-from taichi_rts.neighbours import mean_neighbours
-from taichi_rts.rewind import Rewind
-from taichi_rts.scene import scene_from
-from taichi_rts.stability.survival import demanded_density, largest_stable, watch
-from taichi_rts.stepping.base import Stepper
-from taichi_rts.stepping.steppers import stepper_from
+from taichi_rts.scene.loading import scene_from
+from taichi_rts.scene.near_pairs import mean_neighbours
+from taichi_rts.solver.stepping.base import Stepper
+from taichi_rts.solver.stepping.steppers import stepper_from
+from taichi_rts.trials.demands import demanded_density
+from taichi_rts.trials.memory import peak_memory, reset_peak_memory
+from taichi_rts.trials.survival import largest_stable, watch
 
 NEIGHBOUR_SAMPLES = 5
 

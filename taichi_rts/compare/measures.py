@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from taichi_rts import measuring
 from taichi_rts.compare.trajectory import Trajectory
-from taichi_rts.physics.medium import Medium
-from taichi_rts.sampling import calibrate_mass
-from taichi_rts.scene import Scene
+from taichi_rts.medium.medium import Medium
+from taichi_rts.readings import measures
+from taichi_rts.sampling.sampling import calibrate_mass
+from taichi_rts.scene.geometry import periodic
+from taichi_rts.scene.geometry.periodic import nearest_image
+from taichi_rts.scene.scene import Scene
 
 PARTED = 0.01
 """Two runs have parted when the relative L2 difference of their velocities exceeds this, by default."""
@@ -57,7 +59,7 @@ class Yardstick:
             energy=max(max(row[0] for row in reference.energies), np.finfo(float).tiny),
             pressure=0.5 * scene.rest_density * speed**2,
             momentum=medium.mass * max(len(x) for x in reference.positions) * max(fastest, np.finfo(float).tiny),
-            periods=measuring.periods(scene),
+            periods=periodic.periods(scene),
             probes=default_probes(scene, start) if probes is None else probes,
             medium=medium,
         )
@@ -82,7 +84,7 @@ def default_probes(scene: Scene, start: np.ndarray) -> np.ndarray:
 def differences(one: np.ndarray, two: np.ndarray, periods: np.ndarray) -> np.ndarray:
     """Differences of positions [m] of the ids that both have, (N, dim), to the nearest image across periodic faces."""
     n = min(len(one), len(two))
-    return measuring.nearest_image(one[:n].astype(np.float64) - two[:n], periods)
+    return nearest_image(one[:n].astype(np.float64) - two[:n], periods)
 
 
 def velocity_gap(run: Trajectory, reference: Trajectory, k: int) -> float:
@@ -127,7 +129,7 @@ def positions(run: Trajectory, reference: Trajectory, scale: Yardstick, together
 
 def front_position(run: Trajectory, k: int) -> float:
     """Front of the fluid [m] at sample k: its fifth-largest x."""
-    return measuring.front(run.positions[k])
+    return measures.front(run.positions[k])
 
 
 def front(run: Trajectory, reference: Trajectory, scale: Yardstick, together: int) -> float | None:
@@ -176,7 +178,7 @@ def momentum(run: Trajectory, reference: Trajectory, scale: Yardstick, together:
 
 def probe_pressures(run: Trajectory, k: int, scale: Yardstick) -> np.ndarray:
     """Pressures [Pa] at the probes, (P,), at sample k: sum_j p_j W_j / sum_j W_j over the support radius, 0 where it is empty."""
-    return measuring.interpolate(run.positions[k], run.pressures[k], scale.probes, scale.medium.kernel, scale.periods)
+    return measures.interpolate(run.positions[k], run.pressures[k], scale.probes, scale.medium.kernel, scale.periods)
 
 
 ERRORS: dict[str, Callable[[Trajectory, Trajectory, Yardstick, int], float | None]] = {

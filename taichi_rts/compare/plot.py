@@ -2,27 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
 import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from taichi_rts.compare.analysis import point, series_points
 from taichi_rts.compare.sweeps import describe
-from taichi_rts.errors import OutputError
+from taichi_rts.trials.plotting import MARKERS, PALETTE
 
-PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Okabe & Ito 2008: told apart with any common form of colour blindness; markers differ as well."""
-MARKERS = "osD^vPX"
 AXES = {"wall": "wall time of the solver [s]", "updates": "particle updates"}
-
-
-def require_plots(otherwise: str = "give --no-plot") -> None:
-    """Raise `OutputError` if the extra is not installed, before any work is done."""
-    if importlib.util.find_spec("matplotlib") is None:
-        raise OutputError(
-            f"the plot needs the package matplotlib; run: pip install 'taichi_rts[plots]', or {otherwise}"
-        )
 
 
 def draw(report: Mapping[str, Any]) -> bytes:

@@ -16,25 +16,26 @@ import taichi_rts as rts
 from taichi_rts.compare.jobs import Job
 from taichi_rts.compare.trajectory import Trajectory
 from taichi_rts.errors import OutputError
-from taichi_rts.output.files import write_bytes
-from taichi_rts.stepping.steppers import stepper_data
+from taichi_rts.files.writing import write_bytes
+from taichi_rts.solver.stepping.steppers import stepper_data
 
 FINER = 8.0
 """How many times the smallest step tested is longer than the reference's."""
 COARSER = math.sqrt(2.0)
 """Step of the second reference over the first's. Uniform steps are of second order, so its error is twice the first's, and
 their difference is as large as the first's error: the floor below which no error can be told."""
-BESIDE_THE_SOLVER = (
-    "cli.py",
-    "compare",
-    "output",
-    "panels.py",
-    "rendering",
-    "report.py",
-    "scenes",
-    "stability",
-    "__main__.py",
+SOLVER = (
+    "assembly",
+    "device",
+    "files/unpacking.py",
+    "medium",
+    "particle_files",
+    "sampling",
+    "scene",
+    "simulation.py",
+    "solver",
 )
+"""What decides the bits of a run, in the package; only its change makes references anew."""
 IDLE = ("name", "description", "view")  # of a scene: changes no motion
 
 
@@ -56,13 +57,13 @@ def job_key(job: Job, *more: str) -> str:
 
 
 def source_hash(package: Path | None = None) -> str:
-    """Return the SHA-256 of the solver's source files; what shows, stores or compares results is left out."""
+    """Return the SHA-256 of the source files of `SOLVER`; what shows, stores or compares results is left out."""
     package = Path(rts.__file__).parent if package is None else package
     digest = hashlib.sha256()
     for path in sorted(package.rglob("*.py")):
-        name = path.relative_to(package)
-        if name.parts[0] not in BESIDE_THE_SOLVER:
-            digest.update(f"{name.as_posix()}\0".encode() + path.read_bytes() + b"\0")
+        name = path.relative_to(package).as_posix()
+        if any(name == each or name.startswith(f"{each}/") for each in SOLVER):
+            digest.update(f"{name}\0".encode() + path.read_bytes() + b"\0")
     return digest.hexdigest()
 
 

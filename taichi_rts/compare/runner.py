@@ -9,15 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from taichi_rts.compare import references, sweeps
-from taichi_rts.compare.executors import Task, collect, processes
 from taichi_rts.compare.grounds import Ground, curves, finite
 from taichi_rts.compare.jobs import Job, Outcome, find_largest_stable, run
 from taichi_rts.compare.measures import ERRORS, PARTED, Yardstick, judge, parting
 from taichi_rts.compare.variants import LARGEST_STABLE, Variant, make_variants, smallest_step, uniform_variant
 from taichi_rts.errors import Error
-from taichi_rts.output.files import write_json
-from taichi_rts.scene import Scene, scene_from
-from taichi_rts.stepping.steppers import stepper_from
+from taichi_rts.files.writing import write_json
+from taichi_rts.scene.loading import scene_from
+from taichi_rts.scene.scene import Scene
+from taichi_rts.solver.stepping.steppers import stepper_from
+from taichi_rts.trials.executors import Task, collect, processes
 
 COURANTS = (0.4, 0.6, 0.8)
 SEARCH = 6

@@ -11,7 +11,7 @@ from typing import Any
 
 import taichi_rts as rts
 from taichi_rts.errors import Error, SceneError, StepperError
-from taichi_rts.scene import Scene
+from taichi_rts.scene.scene import Scene
 
 KINDS: dict[str, Any] = {
     "uniform": rts.Uniform,

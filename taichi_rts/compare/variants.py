@@ -8,8 +8,8 @@ from typing import Any
 
 import taichi_rts as rts
 from taichi_rts.compare import sweeps
-from taichi_rts.scene import Scene
-from taichi_rts.stepping.steppers import stepper_data
+from taichi_rts.scene.scene import Scene
+from taichi_rts.solver.stepping.steppers import stepper_data
 
 SWEEP, BASE_STEP, LARGEST_STABLE = "sweep", "base step", "largest stable"
 

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from taichi_rts.errors import OutputError, SimulationDivergedError
+from taichi_rts.files.writing import write_json
 from taichi_rts.output.export import ATTRIBUTES, capture, write_particles
-from taichi_rts.output.files import write_json
 from taichi_rts.particle_files.frame import ParticleFrame
+from taichi_rts.readings.diagnosis import Diagnosis, diagnose
 from taichi_rts.simulation import Simulation
-from taichi_rts.stability.diagnosis import Diagnosis, diagnose
 
 FOLDER = "blow_up"
 

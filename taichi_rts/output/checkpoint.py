@@ -1,6 +1,6 @@
 """Checkpoints: all that decides the bits of what follows, in one file.
 
-What is in it: every field and plain value of each simulation (`taichi_rts.state`), the scene and the stepper as plain data,
+What is in it: every field and plain value of each simulation (`inventory.py`), the scene and the stepper as plain data,
 precision, versions. A simulation is built anew from its scene and its stepper, then its state is put back.
 """
 
@@ -16,15 +16,16 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from taichi_rts import backend
+from taichi_rts.assembly.inventory import State
+from taichi_rts.device import backend
 from taichi_rts.errors import CheckpointError, Error
-from taichi_rts.obstacles import changed_mesh, file_digest
-from taichi_rts.output.archive import Archive, open_archive, write_archive
-from taichi_rts.scene import Scene, scene_from
-from taichi_rts.scene_files.reading import moved_along, parts_with_files, places_beside, require_files_near
+from taichi_rts.files.archive import Archive, open_archive, write_archive
+from taichi_rts.scene.files.reading import moved_along, parts_with_files, places_beside, require_files_near
+from taichi_rts.scene.loading import scene_from
+from taichi_rts.scene.parts.obstacles import changed_mesh, file_digest
+from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
-from taichi_rts.state import State
-from taichi_rts.stepping.steppers import stepper_data, stepper_from
+from taichi_rts.solver.stepping.steppers import stepper_data, stepper_from
 
 FORMAT = 3
 """Counts up when the file's layout changes."""

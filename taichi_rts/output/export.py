@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.errors import OutputError
-from taichi_rts.output.files import write_bytes
+from taichi_rts.files.writing import write_bytes
 from taichi_rts.particle_files.formats import FORMATS, require_format
 from taichi_rts.particle_files.frame import ParticleFrame
 from taichi_rts.particle_files.vtu import collection

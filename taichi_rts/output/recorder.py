@@ -17,25 +17,25 @@ from typing import Any
 import imageio.v3 as imageio
 import numpy as np
 
-from taichi_rts import backend
-from taichi_rts.diagnostics import Energy
+from taichi_rts.assembly.frame_times import frame_times
+from taichi_rts.assembly.resources import require
+from taichi_rts.device import backend
 from taichi_rts.errors import CheckpointError, Interrupted, OutputError, SimulationDivergedError
-from taichi_rts.frames import frame_times
+from taichi_rts.files.film import Gif, Video, require_video
+from taichi_rts.files.lock import FolderLock
+from taichi_rts.files.writing import prepare_folder, require_free, write_json, write_png
+from taichi_rts.medium.energy import Energy
 from taichi_rts.output.blow_up import BlowUpGuard
 from taichi_rts.output.checkpoint import Checkpoint, write
 from taichi_rts.output.export import DEFAULT_ATTRIBUTES, Exporter
-from taichi_rts.output.files import prepare_folder, require_free, write_json, write_png
-from taichi_rts.output.lock import FolderLock
+from taichi_rts.output.panels import Panel
 from taichi_rts.output.resume import checkpoint_name, newest, output_folder
 from taichi_rts.output.series import Series
-from taichi_rts.output.video import Gif, Video, require_video
-from taichi_rts.panels import Panel
 from taichi_rts.rendering import legend
 from taichi_rts.rendering.painter import Painter, PictureOptions, make_renderer
-from taichi_rts.resources import require
-from taichi_rts.scene import Scene
+from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
-from taichi_rts.stepping.steppers import stepper_data
+from taichi_rts.solver.stepping.steppers import stepper_data
 
 MOST_CHECKPOINTS = 100_000
 PIXEL_BYTES = 90  # that a renderer with four samples a pixel takes, and its picture

@@ -11,12 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from taichi_rts.errors import CheckpointError, SceneError
-from taichi_rts.output.archive import open_archive
+from taichi_rts.files.archive import open_archive
 from taichi_rts.output.checkpoint import Checkpoint, differences
-from taichi_rts.panels import Panel
-from taichi_rts.scene import Scene, scene_from
-from taichi_rts.scene_files.reading import parts_with_files
-from taichi_rts.stepping.steppers import stepper_data
+from taichi_rts.output.panels import Panel
+from taichi_rts.scene.files.reading import parts_with_files
+from taichi_rts.scene.loading import scene_from
+from taichi_rts.scene.scene import Scene
+from taichi_rts.solver.stepping.steppers import stepper_data
 
 FOLDER = "checkpoints"
 SCENE_OPTIONS = {"scene", "spacing", "particles", "sound_speed"}

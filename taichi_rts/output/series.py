@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from taichi_rts import measuring, probes
-from taichi_rts.conditions import AXES
 from taichi_rts.errors import OutputError
-from taichi_rts.measuring import FaceForces
-from taichi_rts.output.files import write_bytes
+from taichi_rts.files.writing import write_bytes
+from taichi_rts.readings import measures
+from taichi_rts.readings.measures import FaceForces
+from taichi_rts.scene.geometry.periodic import periods
+from taichi_rts.scene.parts import probes
+from taichi_rts.scene.parts.conditions import AXES
 from taichi_rts.simulation import Simulation
 
 
@@ -26,7 +28,7 @@ class Series:
     centre of mass; max_speed [m/s]; level_n, the share of particles whose step is n base steps (where levels double: n up to
     2n - 1); particle_updates so far; inflow and outlet_n [kg], the mass that has come in so far and that each outlet, counted
     from 0, has taken out; pressure_NAME [Pa] of each probe of the scene; height_NAME [m] of each gauge;
-    force_FACE [N], the pressure force on each wall of the domain along its outward normal (`measuring.FaceForces`). In two
+    force_FACE [N], the pressure force on each wall of the domain along its outward normal (`measures.FaceForces`). In two
     dimensions energies and forces are per metre of depth.
     """
 
@@ -57,15 +59,15 @@ class Series:
         sim, scene = self.sim, self.sim.local
         x, v, rho, level = sim.local_state()
         p = sim.medium.equation_of_state.pressure_numpy(rho)
-        lengths = measuring.periods(scene)
+        lengths = periods(scene)
         centre = x.sum(axis=0, dtype=np.float64) / max(1, len(x)) + sim.origin  # outlets may have taken out all
         points = np.array([probe.position for probe in scene.probes]).reshape(-1, scene.dim)
-        pressures = measuring.interpolate(x, p, points, sim.medium.kernel, lengths)
-        heights = [measuring.water_height(scene, sim.medium, x, np.asarray(g.position)) for g in scene.gauges]
+        pressures = measures.interpolate(x, p, points, sim.medium.kernel, lengths)
+        heights = [measures.water_height(scene, sim.medium, x, np.asarray(g.position)) for g in scene.gauges]
         return {
             "time": sim.time,
             **{f"{name}_energy": value for name, value in sim.energy()._asdict().items()},
-            "front": measuring.front(x) + sim.origin[0],
+            "front": measures.front(x) + sim.origin[0],
             **dict(zip((f"centre_{axis}" for axis in AXES), centre, strict=False)),
             "max_speed": float(np.linalg.norm(v, axis=1).max(initial=0.0)),
             **self._shares(level),

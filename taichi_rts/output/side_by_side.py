@@ -14,9 +14,9 @@ import numpy as np
 import tyro
 
 from taichi_rts.errors import OutputError
-from taichi_rts.output.files import prepare_folder, write_png
-from taichi_rts.output.lock import FolderLock
-from taichi_rts.output.video import Gif, Video, require_video
+from taichi_rts.files.film import Gif, Video, require_video
+from taichi_rts.files.lock import FolderLock
+from taichi_rts.files.writing import prepare_folder, write_png
 from taichi_rts.rendering import legend
 
 SAME_TIME = 1e-6  # share of the time; series.csv has nine digits

@@ -11,8 +11,8 @@ import struct
 
 import numpy as np
 
+from taichi_rts.files.unpacking import gunzip
 from taichi_rts.particle_files.frame import ParticleFrame, from_arrays, pad
-from taichi_rts.particle_files.unpacking import gunzip
 
 MAGIC = b"BgeoV"
 VERSION = 5

@@ -7,8 +7,8 @@ import zipfile
 
 import numpy as np
 
+from taichi_rts.files.unpacking import require_sizes
 from taichi_rts.particle_files.frame import ParticleFrame, from_arrays, from_columns
-from taichi_rts.particle_files.unpacking import require_sizes
 
 PLURALS = {"positions": "position", "velocities": "velocity", "densities": "density"}
 

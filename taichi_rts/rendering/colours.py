@@ -4,6 +4,7 @@ import numpy as np
 from PIL import ImageColor
 
 from taichi_rts.errors import RenderError
+from taichi_rts.readings.levels import octaves
 
 PLAIN = (0.22, 0.50, 0.80)  # water
 
@@ -34,11 +35,6 @@ def _choose(kind: str, name: str, choices: dict):
     if name not in choices:
         raise RenderError(f"{kind} {name!r} is unknown: choose one of {', '.join(choices)}")
     return choices[name]
-
-
-def octaves(levels) -> np.ndarray:
-    """Return 1 + floor(log2 n) of levels n: 1 is in octave 1, 2 and 3 are in octave 2, 4 to 7 in octave 3."""
-    return np.frexp(np.asarray(levels, float))[1]  # exact, unlike a logarithm
 
 
 def level_colours(levels, palette: str = "default", *, doubling: bool = False) -> np.ndarray:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_rts.bodies import bodies
-from taichi_rts.scene import Scene
-from taichi_rts.solids import Solid, make_solid
+from taichi_rts.scene.geometry.bodies import bodies
+from taichi_rts.scene.geometry.making import make_solid
+from taichi_rts.scene.geometry.solid import Solid
+from taichi_rts.scene.scene import Scene
 
 COLOUR = (0.55, 0.54, 0.52)  # sRGB, of none of the palettes
 OVERLAP = 1.1  # radii between spheres

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 
 from taichi_rts.errors import RenderError
-from taichi_rts.placing import at_origin
+from taichi_rts.readings.levels import level_classes, longest_lead, longest_step, milliseconds
 from taichi_rts.rendering import colours, legend
 from taichi_rts.rendering.camera import Camera
 from taichi_rts.rendering.obstacles import ObstaclePoints
 from taichi_rts.rendering.splatter import Splatter
-from taichi_rts.scene import Scene
+from taichi_rts.scene.placing import at_origin
+from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
 
 Mode = Literal["level", "step", "lead", "speed", "density", "sound", "fluid", "pressure", "plain"]
@@ -230,45 +230,3 @@ _BARS = {
     "sound": Painter._sound_bar,
     "pressure": Painter._pressure_bar,
 }
-
-
-def longest_step(sim: Simulation) -> float:
-    """The longest step [s] that the stepper can take."""
-    return sim.schedule.levels * sim.base_step
-
-
-def longest_lead(sim: Simulation) -> float:
-    """Longest time [s] by which a cell can be ahead of the youngest: it begins its last step at most one step ahead."""
-    return (2 if sim.schedule.levels_double else 1) * longest_step(sim)
-
-
-def milliseconds(time: float) -> str:
-    """Return a time [s] as text in ms: with three decimals, or three digits where that would be too coarse."""
-    value = 1e3 * time
-    return f"{value:.3f}" if value >= 0.1 else f"{value:.3g}"
-
-
-class LevelClass(NamedTuple):
-    """Levels that readers see as one: those from `first` to `last`, and how much of the whole they have."""
-
-    first: int
-    last: int
-    share: float
-
-    def __str__(self) -> str:
-        """Return "4", or "4–7"."""
-        return str(self.first) if self.first == self.last else f"{self.first}–{self.last}"
-
-
-def level_classes(shares: Sequence[float] | np.ndarray, doubling: bool) -> list[LevelClass]:
-    """Return a class for each level, or with `doubling` for each octave, which then names only levels that have a share."""
-    share = np.asarray(shares, float)
-    if not doubling:
-        return [LevelClass(n, n, float(part)) for n, part in enumerate(share, start=1)]
-    levels = np.arange(1, len(share) + 1)
-    classes = []
-    for octave in np.unique(colours.octaves(levels)):
-        members = levels[colours.octaves(levels) == octave]
-        some = members[share[members - 1] > 0.0] if share[members - 1].any() else members[:1]
-        classes.append(LevelClass(int(some[0]), int(some[-1]), float(share[members - 1].sum())))
-    return classes

@@ -13,8 +13,8 @@ from functools import partial
 from typing import Any
 
 import taichi_rts as rts
-from taichi_rts.scene import Scene
-from taichi_rts.stepping import criteria
+from taichi_rts.scene.scene import Scene
+from taichi_rts.solver.stepping import criteria
 
 S = 0.05  # spacing [m]
 C = 40.0  # sound speed [m/s]

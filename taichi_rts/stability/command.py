@@ -12,11 +12,11 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from taichi_rts.errors import OutputError
-from taichi_rts.output.files import remove, require_folder, write_bytes, write_json
-from taichi_rts.report import console
+from taichi_rts.files.writing import remove, require_folder, write_bytes, write_json
 from taichi_rts.stability import chart
 from taichi_rts.stability.cases import CASES
 from taichi_rts.stability.suite import SETTINGS, Cell, Plan, run_plan
+from taichi_rts.terminal import console
 
 T = TypeVar("T")
 ARTEFACTS = ("stability.json", "stability.csv", "stability.png", "cells")  # what it writes, and all --overwrite removes

@@ -14,16 +14,16 @@ from pathlib import Path
 from typing import Any
 
 import taichi_rts as rts
-from taichi_rts.compare.executors import processes
 from taichi_rts.errors import SceneError
-from taichi_rts.output.files import write_json
-from taichi_rts.scene import Scene
+from taichi_rts.files.writing import write_json
+from taichi_rts.scene.scene import Scene
+from taichi_rts.solver.stepping.base import Stepper
+from taichi_rts.solver.stepping.regional import REGIONAL_SOUND as SOUND_DEFAULTS
 from taichi_rts.stability.cases import Case
-from taichi_rts.stability.demands import demanded_density
-from taichi_rts.stability.rerun import Rerun
-from taichi_rts.stability.survival import Outcome, largest_stable, watch
-from taichi_rts.stepping.base import Stepper
-from taichi_rts.stepping.regional import REGIONAL_SOUND as SOUND_DEFAULTS
+from taichi_rts.trials.demands import demanded_density
+from taichi_rts.trials.executors import processes
+from taichi_rts.trials.rerun import Rerun
+from taichi_rts.trials.survival import Outcome, largest_stable, watch
 
 LOWEST, HIGHEST = 0.05, 2.0  # courants between which the largest stable one is looked for; steppers take no more than 2
 REFERENCE_COURANTS = (0.1, 0.05, 0.025)

@@ -7,7 +7,7 @@ from combinations import ALL, DROP_MACH, LEVELS, STEPS, drop_on_pool, pairwise, 
 
 import taichi_rts as rts
 from taichi_rts.stability.cases import head_on, impact_on_wall
-from taichi_rts.stability.demands import jump_density
+from taichi_rts.trials.demands import jump_density
 
 
 def test_the_pairwise_set_has_every_two_values_once():

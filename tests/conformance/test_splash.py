@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.stability.survival import lost_particles
+from taichi_rts.trials.survival import lost_particles
 
 LENGTH, DEPTH, SPEED, SPACING = 4.0, 0.1875, 10.0, 0.03125
 POOL = rts.Block((0, 0), (LENGTH, DEPTH))
@@ -110,6 +110,6 @@ def test_no_step_is_longer_than_its_own_sound_allows(run, stepper):
 
 def test_most_of_the_pool_is_spared_the_short_steps(run, stepper, one_sound_speed):
     saved = one_sound_speed.statistics["particle_updates"] / run.statistics["particle_updates"]
-    # One step for all follows the splash. Measured: 0.63, 1.81, 1.66; without the slack of two (`sound_rule.SLACK`)
+    # One step for all follows the splash. Measured: 0.63, 1.81, 1.66; without the slack of two (`solver/sound/rule.SLACK`)
     # 0.65, 2.27, 2.04.
     assert saved >= {"adaptive": 0.6, "regional": 1.7, "asynchronous": 1.55}[stepper]

@@ -132,7 +132,9 @@ def test_cells_are_at_most_a_step_ahead_of_their_neighbours(runs, stepper, name)
 @every_problem
 def test_neighbouring_blocks_obey_the_limiter(runs, stepper, name):
     if not stepper.startswith(("uniform", "regional")):
-        pytest.skip("cells of asynchronous steps are bounded pass by pass: tests/unit/test_asynchronous_schedule.py")
+        pytest.skip(
+            "cells of asynchronous steps are bounded pass by pass: tests/unit/solver/stepping/test_asynchronous_schedule.py"
+        )
     graded = stepper == "regional_graded"
     for x, _, _, level in runs[name].states[1:]:
         found = blocks_with_levels(PROBLEMS[name].scene, x, level)

@@ -2,7 +2,7 @@
 
 Mean kinetic energy [J] over quarters of a second (f32), measured with `Uniform` and the scene's one sound speed of 44.3 m/s,
 with regional sound speeds that fall as soon as they may (slack 1, memory 25), and with the default slack and memory
-(`physics.sound_rule.SLACK`, `RegionalSound.memory`):
+(`rule.SLACK`, `RegionalSound.memory`):
 
     one c        7.7   4.9   3.6   2.7   2.3   2.1   1.7   1.5
     slack 1     45.9  21.2  22.0  25.8  21.5  28.8  22.7  22.1    it never comes to rest

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.scene import scene_from
-from taichi_rts.scene_files.reading import read_scene_file, tomllib
-from taichi_rts.schema import keys_at
+from taichi_rts.scene.files.reading import read_scene_file, tomllib
+from taichi_rts.scene.loading import scene_from
+from taichi_rts.scene.schema import keys_at
 
 FOLDER = Path(__file__).parents[2] / "demos" / "scenes"
 FILES = sorted(FOLDER.glob("*.toml"))

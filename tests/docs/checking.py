@@ -9,12 +9,14 @@ import tyro
 from documents import ROOT
 
 import taichi_rts as rts
-from taichi_rts import cli
+from taichi_rts.commands.main import Command, parse_demo
+from taichi_rts.commands.run import Run, check_angles, check_size
 from taichi_rts.compare.command import Compare
 from taichi_rts.compare.runner import plan
 from taichi_rts.rendering.painter import make_cameras
 from taichi_rts.stability.cases import CASES
-from taichi_rts.stability.command import SETTINGS, Stability, choose
+from taichi_rts.stability.command import Stability, choose
+from taichi_rts.stability.suite import SETTINGS
 
 STAND_INS = {"SCENE": "dam_break_2d", "ADDRESS": "local", "FILE": "state.npz"}
 """What capital letters stand for in the docs."""
@@ -45,8 +47,8 @@ def check_ours(args, loaded):
     """Check a command of `taichi-rts`: its options, its scene, and what its options say together."""
     if "--help" in args:
         args = tuple(arg for arg in args if arg != "--help")
-    command = tyro.cli(cli.Command, args=list(args))
-    if isinstance(command, cli.Run):
+    command = tyro.cli(Command, args=list(args))
+    if isinstance(command, Run):
         check_run(command, loaded)
     elif isinstance(command, Compare):
         command.settings()
@@ -60,8 +62,8 @@ def check_ours(args, loaded):
 def check_run(run, loaded):
     """Check what `Run` says before anything starts."""
     stepper = run.make_stepper()
-    cli.check_size(run.width, run.height)
-    cli.check_angles(run.azimuth, run.elevation)
+    check_size(run.width, run.height)
+    check_angles(run.azimuth, run.elevation)
     if run.resume is not None:
         return
     key = (run.scene, run.particles, run.spacing, run.sound_speed, run.end_time)
@@ -90,7 +92,7 @@ def check_script(path, rest):
     """Check the options of a demo as `taichi-rts run`; of another script, that it knows every word."""
     assert path.is_file(), f"{path} is not there"
     if path.parent.name == "demos":
-        cli.parse_demo(cli.Run(), rest)
+        parse_demo(Run(), rest)
         return
     source = path.read_text(encoding="utf-8")
     ast.parse(source)

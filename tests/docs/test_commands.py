@@ -13,8 +13,8 @@ from documents import PAGES, ROOT, anchors, blocks, commands, links, name, scene
 
 import taichi_rts as rts
 from taichi_rts.errors import Error
-from taichi_rts.scene import scene_from
-from taichi_rts.scene_files.reading import tomllib
+from taichi_rts.scene.files.reading import tomllib
+from taichi_rts.scene.loading import scene_from
 
 ALL = sorted({name(page) for page in PAGES})
 DUMMY = {
@@ -69,9 +69,9 @@ def test_commands_hold(page, folder, loaded, monkeypatch, capsys):
         ("taichi-rts run dam_break --export vtk", "vtk"),
         ("taichi-rts stability --cases pistol", "pistol"),
         ("taichi-rts compare dam_break_2d --steppers uniforn", "uniforn"),
-        ("python tests/benchmarks/faults.py --onyl two", "onyl"),
+        ("python studies/faults.py --onyl two", "onyl"),
         ("python demos/dam_break.py --colour-bye speed", "2"),
-        ("python -m pytest tests/unit/test_obstacles.py -k geometrie", "geometrie"),
+        ("python -m pytest tests/unit/scene/parts/test_obstacles.py -k geometrie", "geometrie"),
         ("make tests", "tests"),
         ("pip install 'taichi_rts[videos]'", "videos"),
         ("cargo run", "cargo"),
@@ -93,7 +93,7 @@ def test_links_lead_somewhere(page):
 
 @pytest.mark.parametrize("page", ALL)
 def test_files_that_are_named_exist(page):
-    named = re.findall(r"`((?:taichi_rts|tests|demos|docs|assets)/[\w./-]+)`", documents.prose(page))
+    named = re.findall(r"`((?:taichi_rts|tests|studies|demos|docs|assets)/[\w./-]+)`", documents.prose(page))
     lost = [file for file in named if not (ROOT / file).exists()]
     assert not lost, page
 

@@ -1,7 +1,7 @@
 """What stands in the docs is run, smaller: some pages from top to bottom, of the others what runs scenes, every Python block.
 
 `compare`, `stability`, `bench` and `--gui` have tests of their own (tests/unit/compare, tests/stability,
-tests/unit/test_benchmarks.py, tests/unit/rendering/test_window.py). Scripts that measure for minutes to hours
+tests/unit/benchmarks/test_benchmarks.py, tests/unit/window/test_window.py). Scripts that measure for minutes to hours
 are only read (test_commands.py).
 """
 
@@ -13,7 +13,7 @@ import pytest
 import taichi as ti
 from documents import PAGES, ROOT, blocks, commands, commands_of, name, scene_files
 
-from taichi_rts import cli
+from taichi_rts.commands.main import main
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_environment")]
 
@@ -83,7 +83,7 @@ def run_shell(text):
     """Run the commands of a block that are ours; the Python block of docs/compare.md does what `compare` does."""
     for words in commands_of(text):
         if words[0] == "taichi-rts" and words[1] != "compare":
-            cli.main(smaller(words))
+            main(smaller(words))
 
 
 def run_python(text, page, folder):
@@ -131,5 +131,5 @@ def test_commands_of_a_page(page, folder):
     for words in to_run(page):
         command = smaller(words)
         again = command[0] == "run" and "--resume" not in command
-        cli.main([*command, *(["--overwrite"] if again and "--overwrite" not in command else [])])
+        main([*command, *(["--overwrite"] if again and "--overwrite" not in command else [])])
     assert list(folder.glob("out/**/*.json"))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scenes import MISSING
 
-from taichi_rts.output.archive import DIGEST, write_archive
+from taichi_rts.files.archive import DIGEST, write_archive
 
 Change = Callable[[dict[str, Any], dict[str, np.ndarray]], None]
 

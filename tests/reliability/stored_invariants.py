@@ -1,6 +1,6 @@
 """What runs of every scene gave when it was last found right, so that a change of the physics cannot go unseen.
 
-`invariants.json` holds it; `python tests/benchmarks/invariants.py --write` writes it anew (docs/reliability.md).
+`invariants.json` holds it; `python studies/invariants.py --write` writes it anew (docs/reliability.md).
 """
 
 import json
@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import taichi_rts as rts
-from taichi_rts.output.files import write_bytes
+from taichi_rts.files.writing import write_bytes
 
 STORED = Path(__file__).with_name("invariants.json")
 STEPPERS = {"uniform": rts.Uniform(), "regional": rts.Regional(), "asynchronous": rts.Asynchronous()}

@@ -7,8 +7,8 @@ from trial import attempt
 
 import taichi_rts as rts
 from taichi_rts.output import checkpoint, recorder
+from taichi_rts.output.panels import Panel
 from taichi_rts.output.recorder import Recorder, Recording
-from taichi_rts.panels import Panel
 from taichi_rts.rendering.painter import PictureOptions
 
 
@@ -43,7 +43,7 @@ def never_starts(monkeypatch, made):
 
     monkeypatch.setattr(checkpoint, "Simulation", lambda *_args, **_options: made[1])
     monkeypatch.setattr(recorder, "Series", stop)
-    monkeypatch.setattr("taichi_rts.cli.rts.init", lambda *_args: made[1].backend)
+    monkeypatch.setattr("taichi_rts.commands.main.rts.init", lambda *_args: made[1].backend)
 
 
 @pytest.mark.usefixtures("never_starts")

@@ -13,7 +13,7 @@ from trial import attempt, without
 
 import taichi_rts as rts
 from taichi_rts.output import recorder
-from taichi_rts.rendering.x_keys import XKeys
+from taichi_rts.window.x_keys import XKeys
 
 
 class StartedError(Exception):

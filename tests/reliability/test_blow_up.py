@@ -8,10 +8,10 @@ from trial import attempt
 
 import taichi_rts as rts
 from taichi_rts.output.blow_up import BlowUpGuard
+from taichi_rts.output.panels import Panel
 from taichi_rts.output.recorder import Recorder, Recording
-from taichi_rts.panels import Panel
+from taichi_rts.readings.diagnosis import diagnose
 from taichi_rts.rendering.painter import PictureOptions
-from taichi_rts.stability.diagnosis import diagnose
 
 pytestmark = pytest.mark.usefixtures("quick_environment")
 

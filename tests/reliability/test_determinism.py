@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from repeat import STEPPERS, leavings
 
-from taichi_rts import backend
+from taichi_rts.device import backend
 
 pytestmark = pytest.mark.slow  # `make test` compares one thread with all in tests/conformance/test_steppers.py
 

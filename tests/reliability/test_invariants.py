@@ -5,7 +5,7 @@ import stored_invariants as stored
 import taichi as ti
 
 import taichi_rts as rts
-from taichi_rts import smoothing
+from taichi_rts.medium import smoothing
 
 QUICK = ("dam_break_2d asynchronous",)
 CASES = [
@@ -14,7 +14,7 @@ CASES = [
     for n, stepper in enumerate(stored.STEPPERS)
     if k % len(stored.STEPPERS) == n or f"{name} {stepper}" in QUICK
 ]
-"""Each scene with one stepper; tests/benchmarks/invariants.py runs all of them."""
+"""Each scene with one stepper; studies/invariants.py runs all of them."""
 
 
 @ti.data_oriented

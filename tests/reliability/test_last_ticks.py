@@ -5,8 +5,8 @@ import dataclasses
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.handover import Snapshot
-from taichi_rts.stepping.timeline import MAX_TICKS
+from taichi_rts.assembly.handover import Snapshot
+from taichi_rts.solver.stepping.timeline import MAX_TICKS
 
 TICKS = 72  # a multiple of all steps, as is `MAX_TICKS`: steps that are aligned then meet the same phase
 

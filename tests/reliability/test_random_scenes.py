@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from scenes import FLAT, FOREIGN, SOLID, paths, to_toml, value_at
 
 import taichi_rts as rts
-from taichi_rts.backend import Backend
-from taichi_rts.resources import require
-from taichi_rts.sampling import sample
-from taichi_rts.scene_size import size_of
+from taichi_rts.assembly.resources import require
+from taichi_rts.device.backend import Backend
+from taichi_rts.sampling.sampling import sample
+from taichi_rts.scene.checks.size import size_of
 
 STEPPERS = [rts.Uniform(), rts.Regional(), rts.Asynchronous()]
 NEEDED = ("domain", "spacing", "fluids", "sound_speed")

@@ -7,10 +7,10 @@ import taichi as ti
 from taichi.lang.util import cook_dtype
 
 import taichi_rts as rts
-from taichi_rts import resources
-from taichi_rts.backend import Backend
-from taichi_rts.sampling import sample
-from taichi_rts.scene_size import MOST, finest_spacing, size_of
+from taichi_rts.assembly import resources
+from taichi_rts.device.backend import Backend
+from taichi_rts.sampling.sampling import sample
+from taichi_rts.scene.checks.size import MOST, finest_spacing, size_of
 
 CPU = Backend("cpu", "f32")
 
@@ -130,7 +130,7 @@ def test_no_buffer_of_a_graphics_device_is_larger_than_is_said(
     with start_taichi("cpu", "f32"):
         for owner in ("backend", "grid"):
             monkeypatch.setattr(f"taichi_rts.{owner}.on_cpu", lambda: False)
-        monkeypatch.setattr("taichi_rts.backend.current", lambda: Backend("vulkan", "f32"))
+        monkeypatch.setattr("taichi_rts.device.backend.current", lambda: Backend("vulkan", "f32"))
         buffers.clear()
         rts.Simulation(scene, stepper)
     assert 1.0 - 1e-9 <= max(resources.buffer_bytes(scene, stepper, "f32").values()) / max(buffers) <= 1.2

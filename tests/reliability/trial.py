@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from scenes import FILES
 
-from taichi_rts import cli
+from taichi_rts.commands.main import main
 
 PATIENCE = 2.0
-"""Seconds of the processor within which bad input is refused: measured by tests/benchmarks/bad_input.py."""
+"""Seconds of the processor within which bad input is refused: measured by studies/bad_input.py."""
 HANG = 20.0
 """The same where a machine may be busy: in tests, which measure no time."""
 
@@ -115,7 +115,7 @@ def attempt(folder: Path, *args: str) -> Trial:
     os.chdir(folder)
     try:
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            cli.main(list(args))
+            main(list(args))
     except SystemExit as stop:
         code = stop.code if isinstance(stop.code, int) else 1
     except Exception as error:

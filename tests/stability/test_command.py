@@ -5,7 +5,7 @@ import imageio.v3 as imageio
 import pytest
 
 import taichi_rts as rts
-from taichi_rts import cli
+from taichi_rts.commands.main import main
 from taichi_rts.stability import chart, command, suite
 from taichi_rts.stability.cases import CASES, Case
 
@@ -43,7 +43,7 @@ def call(tmp_path, monkeypatch, taichi):
 
     def start(*args):
         calls.clear()
-        cli.main(["stability", "--steppers", "serna", "--output-dir", str(folder), *args])
+        main(["stability", "--steppers", "serna", "--output-dir", str(folder), *args])
         return folder, list(calls)
 
     return start
@@ -123,7 +123,7 @@ def test_a_stop_keeps_what_is_done(call, monkeypatch):
 )
 def test_bad_input_is_one_message_and_exit_code_2(args, words, tmp_path, capsys):
     with pytest.raises(SystemExit) as stop:
-        cli.main(["stability", *args, "--output-dir", str(tmp_path / "out")])
+        main(["stability", *args, "--output-dir", str(tmp_path / "out")])
     assert stop.value.code == 2
     captured = capsys.readouterr()
     for word in words:
@@ -134,7 +134,7 @@ def test_bad_input_is_one_message_and_exit_code_2(args, words, tmp_path, capsys)
 def test_an_earlier_map_is_kept(tmp_path, capsys):
     (tmp_path / "stability.json").write_text("{}")
     with pytest.raises(SystemExit) as stop:
-        cli.main(["stability", "--output-dir", str(tmp_path)])
+        main(["stability", "--output-dir", str(tmp_path)])
     assert stop.value.code == 2
     assert "--resume or --overwrite" in capsys.readouterr().err
     assert (tmp_path / "stability.json").read_text() == "{}"

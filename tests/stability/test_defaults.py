@@ -6,7 +6,7 @@ import taichi_rts as rts
 from taichi_rts.stability import chart
 from taichi_rts.stability.cases import CASES
 from taichi_rts.stability.suite import SETTINGS, Plan
-from taichi_rts.stability.survival import watch
+from taichi_rts.trials.survival import watch
 
 BY_NAME = {case.name: case for case in CASES}
 BY_STEPPER = {setting.name: setting for setting in SETTINGS}

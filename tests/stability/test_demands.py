@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.physics.equation_of_state import Tait
-from taichi_rts.stability.demands import demanded_density, impact_speed, jump_density, jump_mach, still_density
+from taichi_rts.medium.equation_of_state import Tait
+from taichi_rts.trials.demands import demanded_density, impact_speed, jump_density, jump_mach, still_density
 
 C = 40.0
 

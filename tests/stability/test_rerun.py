@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.stability import rerun
-from taichi_rts.stability.rerun import Rerun
+from taichi_rts.trials import rerun
+from taichi_rts.trials.rerun import Rerun
 
 POOL, BLOCK = rts.Block((0, 0), (0.8, 0.3)), rts.Block((0.2, 0.35), (0.5, 0.6), velocity=(0, -15))
 SCENE = rts.Scene(domain=rts.Box((0, 0), (0.8, 0.8)), fluids=[POOL, BLOCK], spacing=0.05, sound_speed=40, walls=False)

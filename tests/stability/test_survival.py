@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.stability import survival
+from taichi_rts.readings.diagnosis import diagnose
 from taichi_rts.stability.cases import CASES
-from taichi_rts.stability.diagnosis import diagnose
-from taichi_rts.stability.survival import largest_stable, watch
+from taichi_rts.trials import survival
+from taichi_rts.trials.survival import largest_stable, watch
 
 BY_NAME = {case.name: case for case in CASES}
 

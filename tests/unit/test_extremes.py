@@ -8,8 +8,8 @@ import pytest
 from programs import run
 
 import taichi_rts as rts
-from taichi_rts.extremes import Extremes
-from taichi_rts.scene_size import warn_of_size
+from taichi_rts.readings.extremes import Extremes
+from taichi_rts.scene.checks.size import warn_of_size
 
 
 def extremes(mach, dense, sound=None):

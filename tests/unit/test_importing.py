@@ -11,7 +11,7 @@ from programs import environment
 from taichi_rts.importing import runs_as_program
 
 SLOW = "import time\nprint('importing', flush=True)\ntime.sleep(60)\n"
-SCRIPT = "import sys\nfrom taichi_rts.cli import main\nif __name__ == '__main__':\n    sys.exit(main())\n"
+SCRIPT = "import sys\nfrom taichi_rts.commands.main import main\nif __name__ == '__main__':\n    sys.exit(main())\n"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
+from taichi_rts.assembly.handover import change_stepper
+from taichi_rts.assembly.resources import require_resolution
 from taichi_rts.errors import ResourceError
-from taichi_rts.handover import change_stepper
 from taichi_rts.output.export import Exporter, capture
 from taichi_rts.output.series import Series
 from taichi_rts.particle_files.ply import read_ply
 from taichi_rts.particle_files.surface import write_surface
-from taichi_rts.placing import PLACES, at_origin, origin_of, translated
 from taichi_rts.rendering.painter import Painter, PictureOptions
-from taichi_rts.resources import require_resolution
+from taichi_rts.scene.placing import PLACES, at_origin, origin_of, translated
 
 HERE, KILOMETRE, UTM = (0.0, 0.0), (1000.0, -1000.0), (500000.0, 4649776.0)
 SPACING = (

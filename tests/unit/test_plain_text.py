@@ -7,7 +7,7 @@ import pytest
 from programs import run
 
 import taichi_rts
-from taichi_rts.plain_text import HANDLER, plain, use_plain_text
+from taichi_rts.commands.plain_text import HANDLER, plain, use_plain_text
 
 ENCODINGS = ["cp1252", "latin-1", "ascii", "cp437", "gbk"]
 C_LOCALE = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0", "PYTHONIOENCODING": None}

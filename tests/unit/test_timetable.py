@@ -7,14 +7,14 @@ import pytest
 import taichi as ti
 
 import taichi_rts as rts
-from taichi_rts import backend
-from taichi_rts.bodies import bodies
-from taichi_rts.counters import Counters
-from taichi_rts.physics.momentum import Gravity
-from taichi_rts.physics.obstacles import Path
-from taichi_rts.physics.timetable import Ticking, Timetable
-from taichi_rts.state import parts
-from taichi_rts.stepping.timeline import MAX_TICKS, Timeline
+from taichi_rts.assembly.inventory import parts
+from taichi_rts.device import backend
+from taichi_rts.device.counters import Counters
+from taichi_rts.scene.geometry.bodies import bodies
+from taichi_rts.solver.physics.momentum import Gravity
+from taichi_rts.solver.physics.path import Path
+from taichi_rts.solver.physics.timetable import Ticking, Timetable
+from taichi_rts.solver.stepping.timeline import MAX_TICKS, Timeline
 
 UNIT = rts.Box((0, 0), (1, 1))
 TICK = math.pi * 2.5e-5  # [s]
@@ -261,7 +261,9 @@ def test_counts_go_on_beyond_32_bits(start, alone):
     ids=["aligned", "paper", "asynchronous"],
 )
 def test_counts_of_a_run_may_pass_32_bits(taichi_cpu_f64, stepper, monkeypatch):
-    monkeypatch.setattr("taichi_rts.stepping.aligned.MOST_HELD", 8)  # so that blocks hand over within a few steps
+    monkeypatch.setattr(
+        "taichi_rts.solver.stepping.aligned.MOST_HELD", 8
+    )  # so that blocks hand over within a few steps
     scene = rts.Scene(UNIT, (rts.Block((0, 0), (0.4, 0.6)),), 0.1, sound_speed=50.0)
     sim = rts.Simulation(scene, stepper)
     schedule, full = sim.schedule, 2**32 - 2

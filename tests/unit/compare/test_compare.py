@@ -6,13 +6,14 @@ import pytest
 import taichi as ti
 
 import taichi_rts as rts
-from taichi_rts import cli
-from taichi_rts.compare import compare, executors, jobs, references
-from taichi_rts.compare.executors import Here, Task, collect
+from taichi_rts.assembly.rewind import Rewind
+from taichi_rts.commands.main import main
+from taichi_rts.compare import compare, jobs, references
 from taichi_rts.compare.jobs import Job
 from taichi_rts.compare.runner import Settings
-from taichi_rts.rewind import Rewind
-from taichi_rts.stepping.steppers import stepper_data
+from taichi_rts.solver.stepping.steppers import stepper_data
+from taichi_rts.trials import executors
+from taichi_rts.trials.executors import Here, Task, collect
 
 pytestmark = pytest.mark.usefixtures("quick_environment")
 
@@ -56,7 +57,7 @@ def check_rewind(stepper):
 def test_a_comparison_from_the_command_line(tmp_path, capsys, quick_jobs, monkeypatch):
     args = ["compare", "dam_break_2d", *SIZE, "--steppers", "uniform,regional", "--courants", "0.4"]
     args += ["--cache-dir", str(tmp_path / "cache"), "--output-dir", str(tmp_path / "out")]
-    cli.main(args)
+    main(args)
     shown = capsys.readouterr().out
     report = json.loads((tmp_path / "out" / "compare.json").read_text())
     runs = {run["label"]: run for run in report["variants"]}
@@ -80,16 +81,16 @@ def test_a_comparison_from_the_command_line(tmp_path, capsys, quick_jobs, monkey
 
     # A second call neither overwrites nor runs what is there: the references come from the cache, all runs but one from `runs`.
     with pytest.raises(SystemExit) as stop:
-        cli.main(args)
+        main(args)
     assert stop.value.code == 2
     assert "--resume" in capsys.readouterr().err
     lost = next(p for p in (tmp_path / "out" / "runs").iterdir() if "regional" in p.read_text()[:300])
     lost.unlink()
     made = []
     run = jobs.run
-    monkeypatch.setattr("taichi_rts.compare.runner.run", lambda job: made.append(job) or run(job))
-    monkeypatch.setattr("taichi_rts.compare.runner.find_largest_stable", None)
-    cli.main([*args, "--resume"])
+    monkeypatch.setattr("taichi_rts.compare.jobs.run", lambda job: made.append(job) or run(job))
+    monkeypatch.setattr("taichi_rts.compare.jobs.find_largest_stable", None)
+    main([*args, "--resume"])
     assert [job.stepper["name"] for job in made] == ["regional"]
     again = json.loads((tmp_path / "out" / "compare.json").read_text())
     assert again["scenes"][0]["reference_cached"]
@@ -141,7 +142,7 @@ def test_here_and_plain_futures_are_executors():
 )
 def test_bad_input_is_one_message_and_exit_code_2(args, words, tmp_path, capsys):
     with pytest.raises(SystemExit) as stop:
-        cli.main(["compare", *args, "--output-dir", str(tmp_path / "out")])
+        main(["compare", *args, "--output-dir", str(tmp_path / "out")])
     assert stop.value.code == 2
     captured = capsys.readouterr()
     for word in words:
@@ -154,16 +155,16 @@ def test_a_missing_extra_is_named_before_anything_runs(tmp_path, monkeypatch, ca
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     for args, words in (([], "taichi_rts[plots]"), (["--no-plot", "--dask", "local"], "taichi_rts[cluster]")):
         with pytest.raises(SystemExit):
-            cli.main(["compare", "dam_break_2d", *args, "--output-dir", str(tmp_path / "out")])
+            main(["compare", "dam_break_2d", *args, "--output-dir", str(tmp_path / "out")])
         assert words in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
 def test_a_reference_that_does_not_survive_is_an_error(tmp_path, monkeypatch):
     dead = jobs.Outcome(None, {}, False, "energy +80 %", "cpu f64")
-    monkeypatch.setattr("taichi_rts.compare.runner.run", lambda job: dead)
+    monkeypatch.setattr("taichi_rts.compare.jobs.run", lambda job: dead)
     monkeypatch.setattr(
-        "taichi_rts.compare.runner.find_largest_stable",
+        "taichi_rts.compare.jobs.find_largest_stable",
         lambda job: {"stable": None, "unstable": 0.1, "reason": "energy"},
     )
     scene = rts.load_scene("dam_break_2d", particles=30)

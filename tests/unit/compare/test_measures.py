@@ -5,7 +5,7 @@ import taichi_rts as rts
 from taichi_rts.compare import measures
 from taichi_rts.compare.measures import ERRORS, MATCHED, Yardstick, judge, parting
 from taichi_rts.compare.trajectory import Trajectory
-from taichi_rts.neighbours import mean_neighbours
+from taichi_rts.scene.near_pairs import mean_neighbours
 
 SCENE = rts.Scene(domain=rts.Box((0, 0), (2, 2)), fluids=[rts.Block((0, 0), (1, 1))], spacing=0.1)
 

@@ -8,7 +8,7 @@ from taichi_rts.compare import folder, references
 from taichi_rts.compare.jobs import Job
 from taichi_rts.compare.references import job_key, reference_jobs, source_hash
 from taichi_rts.compare.trajectory import Trajectory
-from taichi_rts.stepping.steppers import stepper_data, stepper_from
+from taichi_rts.solver.stepping.steppers import stepper_data, stepper_from
 
 SCENE = rts.load_scene("dam_break_2d", particles=100)
 JOB = Job(SCENE.to_dict(), stepper_data(rts.Uniform()))
@@ -37,14 +37,15 @@ def test_the_key_depends_on_all_that_decides_the_run_and_on_nothing_else():
 
 
 def test_the_sources_of_the_solver_count_and_others_do_not(tmp_path):
-    for name in ("grid.py", "physics/density.py", "rendering/camera.py", "compare/plot.py", "cli.py"):
+    beside = ("rendering/camera.py", "compare/plot.py", "benchmarks/rows.py", "terminal.py")
+    for name in ("simulation.py", "solver/density.py", *beside):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text("a = 1")
     before = source_hash(tmp_path)
-    for name in ("rendering/camera.py", "compare/plot.py", "cli.py"):
+    for name in beside:
         (tmp_path / name).write_text("a = 2")
     assert source_hash(tmp_path) == before
-    (tmp_path / "physics/density.py").write_text("a = 2")
+    (tmp_path / "solver/density.py").write_text("a = 2")
     assert source_hash(tmp_path) != before
 
 

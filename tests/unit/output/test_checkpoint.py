@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
+from taichi_rts.assembly.inventory import State, is_part, is_plain, transient_names
+from taichi_rts.files.archive import open_archive, write_archive
 from taichi_rts.output import checkpoint
-from taichi_rts.output.archive import open_archive, write_archive
 from taichi_rts.output.checkpoint import Checkpoint, differences
-from taichi_rts.state import State, is_part, is_plain, transient_names
 
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+sys.path.append(str(Path(__file__).parents[3] / "studies"))
 from faults_step import SCENE, STEPPERS
 
 STILL = rts.Scene(
@@ -45,7 +45,7 @@ def stop_in_the_middle(sim, time):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(  # all six: python tests/benchmarks/faults.py
+@pytest.mark.parametrize(  # all six: python studies/faults.py
     ("name", "precision"),
     [
         ("uniform", "f32"),
@@ -142,8 +142,8 @@ def change_header(path, to, **changes):
 
 
 def test_what_a_class_calls_transient_is_known_to_its_heirs():
-    from taichi_rts.physics.moving_walls import MovingFace
-    from taichi_rts.stepping.asynchronous import AsynchronousSchedule
+    from taichi_rts.solver.physics.moving_walls import MovingFace
+    from taichi_rts.solver.stepping.passes import AsynchronousSchedule
 
     assert {"due", "reads_are_slow"} <= transient_names(AsynchronousSchedule)
     assert {"x", "shift"} <= transient_names(MovingFace)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts import cli
+from taichi_rts.commands.main import main
 from taichi_rts.output.export import ATTRIBUTES, Exporter, capture
+from taichi_rts.output.panels import Panel
 from taichi_rts.output.recorder import Recorder, Recording
-from taichi_rts.panels import Panel
 from taichi_rts.rendering.painter import PictureOptions
 
 SCENE = rts.Scene(
@@ -122,7 +122,7 @@ def test_a_missing_extra_is_named(monkeypatch, tmp_path, name, package, extra):
 )
 def test_bad_options_are_one_message(args, words, tmp_path, capsys):
     with pytest.raises(SystemExit) as stop:
-        cli.main(["run", "dam_break_2d", "--arch", "cpu", *args, "--output-dir", str(tmp_path / "out")])
+        main(["run", "dam_break_2d", "--arch", "cpu", *args, "--output-dir", str(tmp_path / "out")])
     assert stop.value.code == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
@@ -139,7 +139,7 @@ def test_a_surface_needs_three_dimensions(tmp_path):
 
 def test_core_imports_no_extra():
     extras = {"h5py", "pysplashsurf", "meshio", "vtk", "matplotlib"}
-    code = f"import sys, taichi_rts, taichi_rts.cli; print(sorted({extras} & set(sys.modules)))"
+    code = f"import sys, taichi_rts, taichi_rts.commands.main; print(sorted({extras} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert done.stdout.strip().endswith("[]")
 

@@ -12,12 +12,12 @@ import pytest
 import taichi as ti
 
 import taichi_rts as rts
-from taichi_rts import cli
-from taichi_rts.output.interrupts import Interrupts
+from taichi_rts.commands.interrupts import Interrupts
+from taichi_rts.commands.main import main
 from taichi_rts.output.recorder import Recorder, checkpoint_times
 from taichi_rts.output.resume import checkpoint_name, newest
 
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+sys.path.append(str(Path(__file__).parents[3] / "studies"))
 from faults import TINY, differing, files, finish, mount, progress, start, wait_for
 
 RUN = ["run", "dam_break_2d", "--arch", "cpu", "--spacing", "0.1", "--end-time", "0.055", "--export-fps", "100"]
@@ -46,7 +46,7 @@ def ended(quick_environment):
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory, ended):
     folder = tmp_path_factory.mktemp("reference") / "out"
-    cli.main([*RUN, "--output-dir", str(folder)])
+    main([*RUN, "--output-dir", str(folder)])
     return folder
 
 
@@ -58,7 +58,7 @@ def wanted(reference):
 def command(*args):
     """Run in this process; returns the exit code."""
     try:
-        cli.main([str(each) for each in args])
+        main([str(each) for each in args])
     except SystemExit as stop:
         return stop.code
     return 0

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from taichi_rts.errors import OutputError
-from taichi_rts.output.files import write_png
+from taichi_rts.files.film import opaque
+from taichi_rts.files.writing import write_png
 from taichi_rts.output.side_by_side import SideBySide
-from taichi_rts.output.video import opaque
 
 TIMES = (0.0, 0.1, 0.2)
 

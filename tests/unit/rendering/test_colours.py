@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from taichi_rts.errors import RenderError
+from taichi_rts.readings.levels import octaves
 from taichi_rts.rendering.colours import (
     COLORMAPS,
     PALETTES,
@@ -9,7 +10,6 @@ from taichi_rts.rendering.colours import (
     colour_by,
     fluid_colours,
     level_colours,
-    octaves,
     scalar_colours,
     step_range,
 )

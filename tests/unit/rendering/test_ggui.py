@@ -5,7 +5,8 @@ import pytest
 
 from taichi_rts.errors import RenderError
 from taichi_rts.rendering.camera import Camera
-from taichi_rts.rendering.ggui import GguiRenderer, LiveWindow
+from taichi_rts.rendering.ggui import GguiRenderer
+from taichi_rts.window.window import LiveWindow
 
 RED = (0.9, 0.1, 0.1)
 

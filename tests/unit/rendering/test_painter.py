@@ -4,16 +4,10 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
+from taichi_rts.readings.levels import level_classes, longest_step, milliseconds
 from taichi_rts.rendering import legend
 from taichi_rts.rendering.colours import level_colours, scalar_colours
-from taichi_rts.rendering.painter import (
-    Painter,
-    PictureOptions,
-    level_classes,
-    longest_step,
-    make_cameras,
-    milliseconds,
-)
+from taichi_rts.rendering.painter import Painter, PictureOptions, make_cameras
 
 SCENE = rts.load_scene("dam_break_2d")
 NOTHING = SimpleNamespace()  # these tests draw no particles

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from taichi_rts import backend
+from taichi_rts.device import backend
 from taichi_rts.errors import RenderError
 from taichi_rts.rendering import splat_kernels
 from taichi_rts.rendering.camera import Camera

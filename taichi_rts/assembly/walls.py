@@ -1,0 +1,44 @@
+"""The walls and obstacles of a run, from its sample."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from taichi_rts.device import backend as backends
+from taichi_rts.sampling.sampling import Sample
+from taichi_rts.scene.geometry.bodies import bodies
+from taichi_rts.scene.geometry.making import make_solid
+from taichi_rts.scene.geometry.solid import distance_grid
+from taichi_rts.scene.scene import Scene
+from taichi_rts.solver.grid.geometry import Geometry
+from taichi_rts.solver.grid.grid import BlockGrid
+from taichi_rts.solver.particles.neighbourhood import Neighbourhood
+from taichi_rts.solver.physics.moving_walls import MovingFace
+from taichi_rts.solver.physics.obstacles import Keeper, MovingBody
+from taichi_rts.solver.physics.walls import Walls
+
+
+def make_walls(
+    scene: Scene, start: Sample, near: Neighbourhood, grid: BlockGrid, backend: backends.Backend
+) -> list[Any]:
+    """Return the walls and obstacles at rest as one, if there are any, and each moving face and obstacle."""
+    geometry, moving_bodies = grid.geometry, bodies(scene)
+    at_rest = [layer for layer, body in zip(start.obstacles, scene.obstacles, strict=True) if body.motion is None]
+    layers = [start.walls.choose(start.owners == number) for number in range(len(scene.moving_walls))]
+    rest = start.walls.choose(start.owners == -1)
+    if at_rest:
+        rest = rest.joined(at_rest)
+    still: list[Any] = [Walls(rest, near, geometry, backend)] if len(rest.positions) else []
+    moving = zip(scene.moving_walls, layers, strict=True)
+    faces = [MovingFace(wall, layer, near, geometry, backend) for wall, layer in moving]
+    turning = [
+        MovingBody(body, start.obstacles[body.number], near, grid, scene.support, backend) for body in moving_bodies
+    ]
+    return still + faces + turning
+
+
+def make_keepers(scene: Scene, geometry: Geometry) -> list[Keeper]:
+    """Return what keeps centres out of each obstacle."""
+    moving = {body.number: body for body in bodies(scene)}
+    solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
+    return [Keeper(distance_grid(solid, scene.spacing), geometry, moving.get(k)) for k, solid in enumerate(solids)]

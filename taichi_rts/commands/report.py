@@ -1,0 +1,215 @@
+"""What a user sees in the terminal: a progress bar while it runs, tables when it is done."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from taichi_rts.assembly.work import speedup_bound
+from taichi_rts.device.backend import Backend
+from taichi_rts.medium.energy import Energy
+from taichi_rts.readings.diagnosis import Diagnosis
+from taichi_rts.readings.levels import level_classes, milliseconds
+from taichi_rts.scene.scene import Scene
+from taichi_rts.simulation import Simulation
+from taichi_rts.terminal import console, rate
+
+NOTABLE_GAIN = 0.01
+"""Share of its energy that a run may gain without a word, as in the conformance tests."""
+LITTLE_ENERGY = 1e-4
+"""Share of what could move below which the energy at the start is next to none, so that no change is a share of it."""
+
+
+@contextmanager
+def progress(
+    runs: Mapping[Any, Simulation], end_time: float, device: Backend, look: Callable[[], None] = lambda: None
+) -> Iterator[Callable[[float], None]]:
+    """Show a bar with physical time, active fraction, updates/s and time left; yields what to call after each frame.
+
+    `look` is called at each frame.
+    """
+    first = next(iter(runs.values()))
+    columns = [
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("t = {task.completed:.3f} / {task.total:g} s  {task.fields[work]}"),
+        TimeRemainingColumn(),
+    ]
+    with Progress(*columns, console=console) as bar:
+        label = f"{first.scene.name}: {first.count:,} particles on {device.arch}"
+        task = bar.add_task(label, total=end_time, work="")
+
+        def on_frame(time: float) -> None:
+            look()
+            statistics = [sim.statistics for sim in runs.values()]
+            updates = sum(s["particle_updates"] for s in statistics)
+            seconds = sum(s["wall_seconds"] for s in statistics)
+            active = statistics[0]["active_fraction"]
+            bar.update(task, completed=time, work=f"active {active:.0%}  {rate(updates, seconds)}")
+
+        yield on_frame
+
+
+def print_table(
+    sim: Simulation,
+    initial_energy: Energy,
+    diagnosis: Diagnosis | None = None,
+    more: Sequence[tuple[str, str]] = (),
+) -> None:
+    """Print shares per level, active fraction, updates/s, bound of the speed-up, energy, `more` facts, and a diagnosis."""
+    statistics = sim.statistics
+    levels = Table(title=f"{sim.scene.name}, {sim.stepper.name} steps", title_justify="left")
+    for heading in ("level", "step [ms]", "share of particles", "share of updates"):
+        levels.add_column(heading, justify="right")
+    for row in level_rows(sim, statistics):
+        levels.add_row(*row)
+    console.print(levels)
+
+    energy = sim.energy()
+    work = sim.work() if sim.keeps_work else 0.0
+    gain, scale = energy.total - work - initial_energy.total, energy_scale(sim)
+    drift = gain / abs(initial_energy.total) if initial_energy.total else 0.0
+    facts = Table(show_header=False, box=None)
+    active, base_steps = statistics["active_fraction"], statistics["base_steps"]
+    facts.add_row("active fraction", f"{active:.3f}")
+    facts.add_row("updates saved", f"{1.0 - active:.1%} over uniform steps of the base step")
+    facts.add_row("base steps", f"{base_steps:,} in {statistics['wall_seconds']:.2f} s")
+    facts.add_row("updates", rate(statistics["particle_updates"], statistics["wall_seconds"]))
+    overhead = statistics["overhead_fraction"]
+    if overhead is not None:
+        passes = statistics.get("passes", base_steps) / max(1, base_steps)
+        bound = speedup_bound(active, overhead, passes)
+        facts.add_row("paid by all (ε)", f"{overhead:.1%} of a full step")
+        facts.add_row("speed-up bound", f"{bound:.2f} over uniform steps of the base step")
+    for name, fact in pass_facts(statistics):
+        facts.add_row(name, fact)
+    if sim.keeps_momentum_budget:
+        share = np.linalg.norm(sim.momentum_drift()) / (
+            sim.medium.mass * sim.count * max(sim.scene.estimate_max_speed(), 1e-9)
+        )
+        facts.add_row("momentum drift", f"{share:.1e} of the mass times the largest speed")
+    if statistics.get("extrapolations") is not None:
+        facts.add_row("extrapolations", str(statistics["extrapolations"]))
+    fact = energy_fact(drift, initial_energy, known=sim.keeps_work)
+    if (
+        abs(initial_energy.total) < LITTLE_ENERGY * scale
+    ):  # nothing that is worth a share of it moves at the start, or could fall
+        fact = f"{abs(gain):.3g} J; at the start there was next to none"
+    facts.add_row("energy " + ("gained" if gain > 0.0 else "dissipated"), fact)
+    if work:
+        facts.add_row("work put in", f"{work:+.4g} J, counted apart")
+    if not sim.keeps_work:
+        facts.add_row("", "with the work of walls and inflows; --debug tells them apart")
+    for name, fact in more:
+        facts.add_row(name, fact)
+    if sim.sound is not None:
+        c = sim.sound_speeds()
+        facts.add_row("sound speed", f"{c.min():.3g} to {c.max():.3g} m/s at the end, mean {c.mean():.3g}")
+        if sim.particles.has_budget:
+            facts.add_row("put in by its changes", f"{sim.sound_work():+.3g} J, in the energy above")
+    for number, removed in enumerate(statistics.get("removed_by_outlets", [])):
+        facts.add_row(f"outlet {number}", f"{removed:,} particles, {removed * sim.medium.mass:.4g} kg")
+    facts.add_row("stopped by the box", f"{statistics['stopped_by_domain']:,} centres")
+    if sim.scene.obstacles:
+        facts.add_row("held by obstacles", f"{statistics['stopped_by_obstacles']:,} times a centre")
+    if statistics["runaways"]:
+        facts.add_row("[bold red]blown up[/]", f"limited {statistics['runaways']:,} times; use a smaller --courant")
+    console.print(facts)
+    if diagnosis is not None:
+        print_diagnosis(diagnosis)
+
+
+def energy_scale(sim: Simulation) -> float:
+    """Kinetic energy [J] that all fluid has at a tenth of the sound speed: what the sound speed expects to move."""
+    return 0.5 * sim.medium.mass * sim.count * (0.1 * sim.medium.sound_speed) ** 2
+
+
+def energy_fact(drift: float, initial: Energy, *, known: bool = True) -> str:
+    """A change of energy as a share of the `initial` one: water loses some, much in a splash, and must not gain any.
+
+    With `known` the work of walls and inflows is left out of it.
+    """
+    fact = f"{abs(drift):.2%} of {initial.total:.4g} J at the start"
+    return f"[bold yellow]{fact}[/]; use a smaller --courant" if known and drift > NOTABLE_GAIN else fact
+
+
+def print_diagnosis(diagnosis: Diagnosis) -> None:
+    """Say when and why a run blew up, and what to do about it."""
+    console.print(f"[bold red]blown up[/] {diagnosis}", soft_wrap=True, highlight=False)
+
+
+def level_rows(sim: Simulation, statistics: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
+    """Return level, step [ms], share of particles and of updates as text; where levels double, a row for each octave in use."""
+    particles, updates = statistics["level_fractions"], statistics["update_fractions"]
+    rows = []
+    for each in level_classes(particles, sim.schedule.levels_double):
+        if each.share > 0.0 or not sim.schedule.levels_double:
+            steps = [milliseconds(n * sim.base_step) for n in sorted({each.first, each.last})]
+            share = sum(updates[each.first - 1 : each.last])
+            rows.append((str(each), "–".join(steps), f"{each.share:.2%}", f"{share:.2%}"))
+    return rows
+
+
+def pass_facts(statistics: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return what a stepper that works in passes has to say about them."""
+    if "passes" not in statistics:
+        return []
+    cells = statistics["cells_per_pass"]
+    return [
+        ("passes", f"{statistics['passes']:,} in {statistics['cycles']:,} cycles"),
+        ("cells in a pass", f"{cells['min']:,} to {cells['max']:,}, median {cells['median']:,.0f}"),
+        ("woken", f"{statistics['wakes']:,} particles"),
+        *(
+            [("[bold]steps too long[/]", f"{statistics['clamped']:,}: use more --levels")]
+            if statistics["clamped"]
+            else []
+        ),
+    ]
+
+
+def print_folder(folder: Path, frames: int, files: Mapping[str, Any]) -> None:
+    """Say where the results are."""
+    pictures = f"{frames} frames in {folder / 'frames'}, " if "frames" in files else ""
+    exports = {path: None for path in files.values() if isinstance(path, str) and "/NNNNNN" in path}
+    exports.pop("frames/NNNNNN.png", None)
+    particles = f"files of {frames} frames in {', '.join(str(folder / path) for path in exports)}, " if exports else ""
+    series = f"time series in {folder / files['series'][0]}, "
+    console.print(f"{pictures}{particles}{series}facts in {folder / 'run.json'}", soft_wrap=True, markup=False)
+
+
+def print_finished(folder: Path, end_time: float) -> None:
+    """Say that there is nothing to go on with."""
+    console.print(
+        f"{folder} is finished (t = {end_time:g} s); a later --end-time goes on, --overwrite runs again from the checkpoint",
+        soft_wrap=True,
+        highlight=False,
+        markup=False,
+    )
+
+
+def print_scenes(scenes: list[Scene]) -> None:
+    """Print a table of scenes."""
+    table = Table("name", "dim", "particles", "end [s]", "what it is")
+    for scene in scenes:
+        count = scene.volume / scene.spacing**scene.dim
+        table.add_row(scene.name, str(scene.dim), f"{count:,.0f}", f"{scene.end_time:g}", scene.description)
+    console.print(table)
+
+
+def print_info(support: Mapping[str, str]) -> None:
+    """Print versions and arches."""
+    table = Table("what", "here", show_header=False)
+    for name in ("taichi_rts", "taichi", "numpy"):
+        table.add_row(name, version(name))
+    table.add_row("python", platform.python_version())
+    for arch, state in support.items():
+        table.add_row(f"arch {arch}", state)
+    console.print(table)

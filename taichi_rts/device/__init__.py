@@ -1,0 +1,1 @@
+"""Taichi and the device: the backend, scans, and what spares the front end work."""

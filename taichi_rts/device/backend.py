@@ -1,0 +1,300 @@
+"""The only place that calls `ti.init`: which device runs the kernels, and in which precision."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import ctypes.util
+import io
+import os
+from dataclasses import dataclass
+from typing import Any
+
+from taichi_rts.device import kernel_cache
+
+os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
+os.environ.update(kernel_cache.home_for_taichi())
+
+import numpy as np
+import taichi as ti
+from taichi.lang import kernel_impl
+from taichi.lang.ast import ast_transformer_utils
+
+from taichi_rts.device import source_cache
+from taichi_rts.device.ownership import Start, holds_fields, require_own_process
+from taichi_rts.errors import BackendError
+
+ARCHES = ("cuda", "vulkan", "cpu")  # the order in which `auto` tries them
+PRECISIONS = {"f32": (ti.f32, np.float32), "f64": (ti.f64, np.float64)}
+_REMEDIES = {
+    "cuda": "install an NVIDIA driver, or use --arch cpu",
+    "vulkan": "install a Vulkan driver (Debian: apt-get install libvulkan1 mesa-vulkan-drivers), or use --arch cpu",
+    "cpu": "reinstall taichi for this platform",
+}
+CHUNK = 512
+"""Iterations of a loop that Taichi gives to a CPU thread at a time, whatever `block_dim` says; shorter loops run in one."""
+_VK_DEVICE_TYPE_CPU = 4  # VkPhysicalDeviceType of a software rasteriser such as Mesa's lavapipe
+
+
+@dataclass(frozen=True)
+class Backend:
+    """What was initialised: `arch` and `precision` as named by the user, and what follows from them."""
+
+    arch: str
+    precision: str
+
+    @property
+    def dtype(self) -> Any:
+        """Taichi's floating-point type."""
+        return PRECISIONS[self.precision][0]
+
+    @property
+    def numpy_dtype(self) -> Any:
+        """The same as a NumPy type."""
+        return PRECISIONS[self.precision][1]
+
+    @property
+    def lanes(self) -> int:
+        """Candidates per inner loop of constant length; 1 is a plain loop.
+
+        LLVM turns 16 candidates into vector instructions, while a loop of unknown length over the same 15-25
+        candidates runs mostly in its scalar remainder: 203 against 694 ns per particle and core in a density pass.
+        """
+        return 16 if self.arch == "cpu" else 1
+
+
+_current: Backend | None = None
+_start_of_current: Start | None = None
+_asked_for = ""
+"""Arch that `init` was given; empty where it uses a Taichi that others have started."""
+_options: dict[str, Any] = {}
+source_cache.remember(ast_transformer_utils, kernel_impl)
+_DEFAULT_CACHE = str(ti.lang.impl.default_cfg().offline_cache_file_path)
+
+
+def init(
+    arch: str = "auto",
+    precision: str | None = None,
+    *,
+    reuse: bool = False,
+    restart: bool = False,
+    **taichi_options: Any,
+) -> Backend:
+    """Start Taichi on `arch` (auto, cuda, vulkan or cpu) with `precision` (f32, the default, or f64).
+
+    `auto` takes the first of cuda, vulkan, cpu that works; it passes over a Vulkan that is only a software
+    rasteriser, which is slower than the CPU backend (name it to get it). Further keywords go to `ti.init`.
+
+    Once more with the same arguments it changes nothing. With others, or with `restart`, it frees the memory of all
+    simulations and fields made before; what is asked of such a simulation then raises `BackendError`. With `reuse` it uses
+    the Taichi that `ti.init` has started, on the arch and in the precision that it has, and leaves its fields alone.
+
+    Raises `BackendError` if the arch is unknown or missing (nothing falls back silently), if it would free fields of a
+    Taichi that `ti.init` has started, if there is none to reuse or it does not fit, and in a process that was forked after
+    Taichi had started (docs/starting.md).
+    """
+    require_own_process()
+    if arch not in ("auto", *ARCHES):
+        raise BackendError(f"arch {arch!r} is unknown; choose one of auto, {', '.join(ARCHES)}")
+    if precision is not None and precision not in PRECISIONS:
+        raise BackendError(f"precision {precision!r} is unknown; choose one of {', '.join(PRECISIONS)}")
+    ti.set_logging_level(ti.ERROR)
+    if reuse:
+        if restart or taichi_options:
+            raise BackendError(
+                f"reuse leaves Taichi as it is, so {', '.join(['restart'] * restart + sorted(taichi_options))} cannot be obeyed; "
+                "leave it out, or give it to ti.init"
+            )
+        return _remember(_running(arch, precision), "", {})
+    precision = precision or "f32"
+    lives = _start_of_current is not None and _start_of_current.lives
+    if lives and not restart and _is_the_same(arch, precision, taichi_options):
+        return current()
+    if not (lives and _asked_for) and holds_fields():
+        raise BackendError(
+            "Taichi was started by ti.init, and init would start it again, which destroys the fields that were made there; "
+            "call init(reuse=True) to use it as it is, make your fields after init, or call ti.reset() first to give them up"
+        )
+    candidates = ARCHES if arch == "auto" else (arch,)
+    for name in candidates:
+        if arch == "auto" and name == "vulkan" and not has_vulkan_hardware():
+            continue
+        if _start(name, precision, taichi_options):
+            return _remember(Backend(name, precision), arch, taichi_options)
+    raise BackendError(f"arch {arch!r} is not available on this machine; {_REMEDIES[candidates[-1]]}")
+
+
+def current() -> Backend:
+    """Return the backend in use; raises `BackendError` before `init`, and where Taichi was started again by others since."""
+    require_own_process()
+    if _current is None or _start_of_current is None:
+        raise BackendError('Taichi is not initialised; call taichi_rts.init(arch="auto") first')
+    if not _start_of_current.lives:
+        raise BackendError(
+            "Taichi was started again by ti.init, or reset, since init; call init(reuse=True) to use it as it is, "
+            "or init() once more"
+        )
+    return _current
+
+
+def start_for_fields() -> Start:
+    """Return the start of Taichi that fields made here and now belong to.
+
+    In another thread than the one that called `init` Taichi is started again if there is nothing yet that this would free.
+    Raises `BackendError` as `current` does, and if fields can only be made in that other thread.
+    """
+    device = current()
+    assert _start_of_current is not None
+    if _asked_for and not _start_of_current.is_here and not holds_fields():
+        init(device.arch, device.precision, restart=True, **_options)
+    _start_of_current.require_thread()
+    return _start_of_current
+
+
+def _is_the_same(arch: str, precision: str, options: dict[str, Any]) -> bool:
+    """Whether the backend in use is what these arguments of `init` ask for, and need not move to the present thread."""
+    assert _current is not None
+    assert _start_of_current is not None
+    same = precision == _current.precision and (arch == _current.arch or arch == "auto" == _asked_for)
+    return same and options == _options and (_start_of_current.is_here or holds_fields())
+
+
+def _remember(backend: Backend, asked_for: str, options: dict[str, Any]) -> Backend:
+    global _current, _start_of_current, _asked_for, _options
+    _current, _start_of_current, _asked_for, _options = backend, Start(), asked_for, dict(options)
+    return backend
+
+
+def _running(arch: str, precision: str | None) -> Backend:
+    """Return what `ti.init` has started; raises `BackendError` if there is nothing, or it is not as asked for or as needed."""
+    runtime = ti.lang.impl.get_runtime()
+    if runtime.prog is None:
+        raise BackendError("there is no Taichi to reuse; call ti.init first, or leave out reuse")
+    found = {getattr(ti, name): name for name in ARCHES}.get(ti.lang.impl.current_cfg().arch)
+    if found is None or arch not in ("auto", found):
+        there = found or str(ti.lang.impl.current_cfg().arch).removeprefix("Arch.")
+        wanted = arch if found else f"one of {', '.join(ARCHES)}"
+        raise BackendError(
+            f"Taichi runs on arch {there!r}, and {wanted} is needed; give it to ti.init, or leave out reuse"
+        )
+    kind = {each[0]: name for name, each in PRECISIONS.items()}.get(runtime.default_fp)
+    if kind is None or precision not in (None, kind):
+        wanted = precision or "f32 or f64"
+        raise BackendError(
+            f"Taichi's default_fp is {runtime.default_fp.to_string()}, and {wanted} is needed; "
+            "give it to ti.init, or leave out reuse"
+        )
+    if runtime.default_ip != ti.i32:
+        raise BackendError(
+            f"Taichi's default_ip is {runtime.default_ip.to_string()}, and i32 is needed; give it to ti.init, or leave out reuse"
+        )
+    return Backend(found, kind)
+
+
+def threads() -> int:
+    """Threads that kernels run on with arch cpu; `ti.global_thread_idx()` is less."""
+    return int(ti.lang.impl.default_cfg().cpu_max_num_threads)
+
+
+def on_cpu() -> bool:
+    """Whether kernels run on the CPU, where a short loop is quicker in one thread than waking the others."""
+    return bool(ti.lang.impl.current_cfg().arch == ti.cpu)
+
+
+def available() -> dict[str, str]:
+    """Say for each arch whether it can be used here, without starting it."""
+    ti.set_logging_level(ti.ERROR)  # looking for CUDA warns where there is none
+    support = {}
+    for name in ARCHES:
+        built = ti.lang.misc.is_arch_supported(getattr(ti, name))
+        support[name] = "available" if built else f"not available: {_REMEDIES[name]}"
+    if support["vulkan"] == "available":
+        kinds = vulkan_device_types()
+        if not kinds:
+            support["vulkan"] = f"not available: {_REMEDIES['vulkan']}"
+        elif not has_vulkan_hardware():
+            support["vulkan"] = "available (software rasteriser; auto passes over it)"
+    return support
+
+
+def _start(name: str, precision: str, options: dict[str, Any]) -> bool:
+    if not ti.lang.misc.is_arch_supported(getattr(ti, name)):
+        return False
+    if name == "vulkan" and not vulkan_device_types():
+        return False
+    settings = {"log_level": ti.ERROR, "enable_fallback": False} | options
+    folder = str(options.get("offline_cache_file_path") or os.environ.get(kernel_cache.VARIABLE) or _DEFAULT_CACHE)
+    settings["offline_cache_file_path"] = kernel_cache.usable_folder(folder)
+    others = _thread_ids()
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):  # its banner would break progress bars and piped output
+            ti.init(arch=getattr(ti, name), default_fp=PRECISIONS[precision][0], default_ip=ti.i32, **settings)
+    except RuntimeError:
+        return False
+    if name == "cpu":
+        _pin_threads(sorted(_thread_ids() - others))
+    return True
+
+
+def _thread_ids() -> set[int]:
+    """Ids of the threads of this process; empty where only Linux could say."""
+    try:
+        return {int(entry) for entry in os.listdir("/proc/self/task")}
+    except OSError:
+        return set()
+
+
+def _pin_threads(started: list[int]) -> None:
+    """Give every thread of Taichi's pool, the last of those that `ti.init` has `started`, a core of its own.
+
+    They sleep between loops, and Linux wakes them on the core that they were woken from: two threads then share one core for
+    milliseconds, longer than most kernels take (docs/speed.md). Only if there is a thread for every core that the process may
+    use: fewer threads are for sharing the machine, and must be free to move. TAICHI_RTS_PIN=0 in the environment turns it off.
+    """
+    if not hasattr(os, "sched_setaffinity") or os.environ.get("TAICHI_RTS_PIN", "1") == "0":
+        return
+    cores = sorted(os.sched_getaffinity(0))
+    if len(cores) == threads() <= len(started):
+        for thread, core in zip(started[-len(cores) :], cores, strict=True):
+            with contextlib.suppress(OSError):  # a thread that has ended, or a sandbox that forbids it
+                os.sched_setaffinity(thread, {core})
+
+
+def has_vulkan_hardware() -> bool:
+    """True if a Vulkan device that is not a software rasteriser is present."""
+    return any(kind != _VK_DEVICE_TYPE_CPU for kind in vulkan_device_types())
+
+
+def vulkan_device_types() -> list[int]:
+    """List the VkPhysicalDeviceType of each Vulkan device; empty without a loader or driver.
+
+    Asked of the loader itself, because Taichi ends the process when it finds a loader without a device.
+    """
+    name = "vulkan-1" if os.name == "nt" else "vulkan"
+    path = ctypes.util.find_library(name)
+    try:
+        loader = ctypes.CDLL(path or ("vulkan-1.dll" if os.name == "nt" else "libvulkan.so.1"))
+    except OSError:
+        return []
+
+    class InstanceInfo(ctypes.Structure):  # VkInstanceCreateInfo
+        _fields_ = (
+            ("type", ctypes.c_int), ("next", ctypes.c_void_p), ("flags", ctypes.c_uint32),
+            ("application", ctypes.c_void_p), ("layer_count", ctypes.c_uint32), ("layers", ctypes.c_void_p),
+            ("extension_count", ctypes.c_uint32), ("extensions", ctypes.c_void_p),
+        )  # fmt: skip
+
+    instance = ctypes.c_void_p()
+    if loader.vkCreateInstance(ctypes.byref(InstanceInfo(type=1)), None, ctypes.byref(instance)) != 0:
+        return []
+    count = ctypes.c_uint32()
+    loader.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), None)
+    devices = (ctypes.c_void_p * count.value)()
+    loader.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), devices)
+    kinds = []
+    for device in devices:
+        properties = (ctypes.c_uint32 * 512)()  # VkPhysicalDeviceProperties is 824 bytes; its fifth word is the type
+        loader.vkGetPhysicalDeviceProperties(ctypes.c_void_p(device), ctypes.byref(properties))
+        kinds.append(properties[4])
+    loader.vkDestroyInstance(instance, None)
+    return kinds

@@ -1,0 +1,1 @@
+"""What the fluid is made of: kernel functions, equation of state, mass, energy."""

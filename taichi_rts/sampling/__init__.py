@@ -1,0 +1,1 @@
+"""From shapes to particles, of fluid and of walls."""

@@ -1,0 +1,93 @@
+"""What can be wrong with a scene's obstacles: every finding is one line with value, limit and remedy."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taichi_rts.errors import SceneError
+from taichi_rts.scene.geometry.drowned import is_drowned
+from taichi_rts.scene.geometry.making import make_solid
+from taichi_rts.scene.geometry.solid import Solid
+
+if TYPE_CHECKING:
+    from taichi_rts.scene.scene import Scene
+
+FAR_LARGER = 20.0
+"""Extent of an obstacle over the domain's from which its file must be in another unit."""
+
+
+def obstacle_faults(scene: Scene) -> list[str]:
+    """Find what is wrong with each obstacle, and fluids that lie wholly in one."""
+    faults: list[str] = []
+    solids = []
+    for k, obstacle in enumerate(scene.obstacles):
+        found = [f"obstacles.{k}: {fault}" for fault in _dimension_faults(scene, obstacle)]
+        if not found:
+            try:
+                solid = make_solid(obstacle, scene.spacing, scene.domain)
+            except SceneError as error:
+                found = [f"obstacles.{k}: {error}"]
+            else:
+                found = [f"obstacles.{k}: {fault}" for fault in _place_faults(scene, obstacle, solid)]
+                solids.append((k, solid))
+        faults += found
+    return faults or _drowned_faults(scene, solids)
+
+
+def _dimension_faults(scene: Scene, obstacle: Any) -> list[str]:
+    """Find vectors that have not the scene's number of components."""
+    dim = scene.dim
+    if obstacle.dim != dim:
+        return [f"{obstacle.shape} has {obstacle.dim} dimensions; the domain has {dim}"]
+    expected = 1 if dim == 2 else 3
+    named = [("rotation", getattr(obstacle, "rotation", None), expected)]
+    if obstacle.motion is not None:
+        named.append(("motion.pivot", obstacle.motion.pivot, dim))
+        for name, value, turns in obstacle.motion.components():
+            named.append((f"motion.{name}", value, expected if turns else dim))
+    return [
+        f"{name} {value} has {len(value)} components; in {dim} dimensions give {count}"
+        for name, value, count in named
+        if value is not None and len(value) != count
+    ]
+
+
+def _place_faults(scene: Scene, obstacle: Any, solid: Solid) -> list[str]:
+    """Find an obstacle of the wrong size or outside the domain."""
+    low, high = np.array(scene.domain.lower), np.array(scene.domain.upper)
+    size = float((solid.upper - solid.lower).max())
+    where = f"{obstacle.shape} from {_text(solid.lower)} to {_text(solid.upper)}"
+    if obstacle.shape == "mesh" and size > FAR_LARGER * float((high - low).max()):
+        return [
+            f"mesh is {size:g} m across, the domain {(high - low).max():g} m, so its file is in another unit; "
+            f"set scale, 0.001 if it is in mm (now {max(obstacle.scale):g})"
+        ]
+    if solid.thickness < scene.spacing * (1 - 1e-6):
+        unit = ", or set scale if its file is in another unit" if obstacle.shape == "mesh" else ""
+        return [
+            f"{obstacle.shape} is {solid.thickness:g} m thin, the spacing {scene.spacing:g}; "
+            f"use a spacing of at most {solid.thickness:g}{unit}"
+        ]
+    if (solid.upper <= low).any() or (solid.lower >= high).any():
+        return [f"{where} lies outside the domain from {_text(low)} to {_text(high)}; move it inside"]
+    around = np.array(scene.is_periodic)
+    if ((solid.lower < low) | (solid.upper > high))[around].any():
+        return [f"{where} crosses a periodic face of the domain; move it inside"]
+    return []
+
+
+def _drowned_faults(scene: Scene, solids: list[tuple[int, Solid]]) -> list[str]:
+    """Find fluids of which nothing is left outside the obstacles."""
+    return [
+        f"fluids.{n}: lies wholly inside obstacles.{k}; move or shrink one of them"
+        for n, fluid in enumerate(scene.fluids)
+        if len(fluid.lower) == scene.dim
+        for k, solid in solids
+        if is_drowned(fluid, solid, scene.spacing)
+    ]
+
+
+def _text(x: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in x) + ")"

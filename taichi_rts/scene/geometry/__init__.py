@@ -1,0 +1,1 @@
+"""Solids: signed distances, surfaces, meshes, and how they move."""

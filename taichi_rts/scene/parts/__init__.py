@@ -1,0 +1,1 @@
+"""The parts that a scene is described by."""

@@ -1,0 +1,1 @@
+"""The block grid and sums over neighbours."""

@@ -1,0 +1,164 @@
+"""How space is cut into blocks and cells."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import taichi as ti
+
+from taichi_rts.device.counts import CELLS_PER_BLOCK
+
+MARGIN = 1  # blocks around the domain, so that no neighbour index leaves the grid; wall particles lie there
+
+
+@ti.data_oriented
+class Geometry:
+    """How space is cut: origin [m], block side [m], shape in blocks with margin.
+
+    With `drift` zero a block's side is the support radius. Where the grid serves for longer than one step, particles may
+    drift by up to `drift` [m] from where they were sorted in, and two that interact by twice that: the side grows by as much,
+    so that they still lie in neighbouring blocks, and `reach` is how far from a particle its neighbours were sorted in.
+
+    Along a `periodic` axis blocks are a little longer, so that a whole number fits, and the first lies beside the last.
+    """
+
+    def __init__(
+        self,
+        lower: Sequence[float],
+        upper: Sequence[float],
+        support: float,
+        drift: float = 0.0,
+        periodic: Sequence[bool] | None = None,
+    ) -> None:
+        self.dim = len(lower)
+        self.lower = tuple(lower)
+        self.upper = tuple(upper)
+        self.lengths = tuple(b - a for a, b in zip(lower, upper, strict=True))
+        self.periodic = tuple(periodic or [False] * self.dim)
+        self.repeats = any(self.periodic)
+        side = support + 2.0 * drift
+        self.drift = drift
+        self.reach = support + drift
+        inside = [
+            max(1, math.floor(length / side + 1e-9) if around else math.ceil(length / side - 1e-9))
+            for length, around in zip(self.lengths, self.periodic, strict=True)
+        ]
+        self.inside = tuple(inside)
+        self.sides = tuple(
+            length / n if around else side
+            for length, n, around in zip(self.lengths, inside, self.periodic, strict=True)
+        )
+        # A centre exactly on the upper face belongs to one more block; it and the wall layers share the margin.
+        self.shape = tuple(n + 2 * MARGIN + 1 for n in inside)
+        self.blocks = math.prod(self.shape)
+        self.cells = self.blocks * CELLS_PER_BLOCK
+        self.row_length = self.shape[0] * CELLS_PER_BLOCK
+        self.block_strides = tuple(math.prod(self.shape[:d]) for d in range(self.dim))
+        offsets = np.stack(np.meshgrid(*[[-1, 0, 1]] * self.dim, indexing="ij"), axis=-1).reshape(-1, self.dim)
+        self.offsets = [tuple(map(int, offset)) for offset in offsets if offset.any()]
+        self.neighbour_strides = [int(np.array(o) @ np.array(self.block_strides)) for o in self.offsets]
+        """Index differences to the 8 (26) blocks around a block, where no periodic axis is crossed."""
+
+    @ti.func
+    def beside(self, block, k: ti.template()):
+        """Index of the k-th of the 8 (26) blocks around `block`."""
+        other = block + self.neighbour_strides[k]
+        for d in ti.static(range(self.dim)):
+            if ti.static(self.periodic[d] and self.offsets[k][d] != 0):
+                step, stride, inside = ti.static(self.offsets[k][d], self.block_strides[d], self.inside[d])
+                place = (block // stride) % self.shape[d] + step
+                if place < MARGIN:
+                    other += inside * stride
+                elif place >= MARGIN + inside:
+                    other -= inside * stride
+        return other
+
+    def spread(self, flags: np.ndarray) -> np.ndarray:
+        """Flag also the blocks around flagged ones; (blocks,) booleans."""
+        grid = flags.reshape(self.shape[::-1])
+        for axis, (around, inside) in enumerate(zip(self.periodic[::-1], self.inside[::-1], strict=True)):
+            if around:  # the margins hold a copy of the other end
+                grid = np.swapaxes(grid.copy(), 0, axis)
+                grid[0], grid[MARGIN + inside] = grid[inside], grid[MARGIN]
+                grid = np.swapaxes(grid, 0, axis)
+        copied = grid.reshape(-1)
+        spread = copied.copy()
+        for stride in self.neighbour_strides:
+            spread |= np.roll(copied, stride)
+        return spread
+
+    @ti.func
+    def place(self, x):
+        """Nearest point of the domain box to `x` [m], along periodic axes the one that stands for it.
+
+        Also turns NaN into a corner, so no index ever leaves the grid.
+        """
+        y = x
+        for d in ti.static(range(self.dim)):
+            if ti.static(self.periodic[d]):
+                y[d] -= self.lengths[d] * ti.floor((x[d] - self.lower[d]) * (1.0 / self.lengths[d]))
+            y[d] = ti.min(ti.max(y[d], self.lower[d]), self.upper[d])
+        return y
+
+    @ti.func
+    def difference(self, x_i, x_j):
+        """x_i - x_j [m], along periodic axes to the nearest of the images of j."""
+        x_ij = x_i - x_j
+        for d in ti.static(range(self.dim)):
+            if ti.static(self.periodic[d]):
+                x_ij[d] -= self.lengths[d] * ti.floor(x_ij[d] * (1.0 / self.lengths[d]) + 0.5)
+        return x_ij
+
+    @ti.func
+    def column(self, x):
+        """Cell number along x of coordinate `x` [m]."""
+        scale = CELLS_PER_BLOCK / self.sides[0]
+        return ti.cast(ti.floor((x - self.lower[0]) * scale), ti.i32) + MARGIN * CELLS_PER_BLOCK
+
+    @ti.func
+    def row(self, x):
+        """Number of the row of blocks that holds position `x` [m], (dim,)."""
+        number = 0
+        for d in ti.static(range(1, self.dim)):
+            step = ti.cast(ti.floor((x[d] - self.lower[d]) * (1.0 / self.sides[d])), ti.i32) + MARGIN
+            if ti.static(self.periodic[d]):  # where the upper face is the lower one
+                step = ti.min(step, MARGIN + self.inside[d] - 1)
+            number += step * (self.block_strides[d] // self.shape[0])
+        return number
+
+    @ti.func
+    def cell(self, x):
+        """Cell index of position `x` [m], (dim,), which must lie in the domain or its margin."""
+        column = self.column(x[0])
+        if ti.static(self.periodic[0]):
+            column = ti.min(column, (MARGIN + self.inside[0]) * CELLS_PER_BLOCK - 1)
+        return self.row(x) * self.row_length + column
+
+    @ti.func
+    def row_beside(self, row, dy, dz):
+        """Number of the row of blocks `dy` and `dz` rows further, in two dimensions `dy` alone."""
+        other = row + dy
+        if ti.static(self.dim == 3):
+            other += dz * self.shape[1]
+        if ti.static(self.periodic[1]):
+            y = row % self.shape[1] + dy
+            if y < MARGIN:
+                other += self.inside[1]
+            elif y >= MARGIN + self.inside[1]:
+                other -= self.inside[1]
+        if ti.static(self.dim == 3 and self.periodic[-1]):
+            z = row // self.shape[1] + dz
+            if z < MARGIN:
+                other += self.inside[2] * self.shape[1]
+            elif z >= MARGIN + self.inside[2]:
+                other -= self.inside[2] * self.shape[1]
+        return other
+
+    def cell_numpy(self, x: np.ndarray) -> np.ndarray:
+        """The same for a NumPy array of positions [m], (N, dim)."""
+        column = np.floor((x[:, 0] - self.lower[0]) * (CELLS_PER_BLOCK / self.sides[0])).astype(np.int64)
+        cell = column + MARGIN * CELLS_PER_BLOCK
+        for d in range(1, self.dim):
+            step = np.floor((x[:, d] - self.lower[d]) / self.sides[d]).astype(np.int64) + MARGIN
+            cell += step * self.block_strides[d] * CELLS_PER_BLOCK
+        return cell

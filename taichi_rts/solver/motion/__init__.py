@@ -1,0 +1,1 @@
+"""How particles move, enter and leave."""

@@ -1,0 +1,56 @@
+"""What neighbours read of a particle in one step."""
+
+from collections.abc import Set
+from typing import Any
+
+import taichi as ti
+
+from taichi_rts.device.backend import Backend
+from taichi_rts.solver.particles.fields import components, vector_field
+
+
+@ti.data_oriented
+class Neighbourhood:
+    """What pair loops read, in the grid's order: predicted position x and velocity v, density rho, p/rho^2 [m^5/(kg s^2)].
+
+    With a periodic `geometry` positions are those of any image. With `needs` "acceleration" also a [m/s^2] of the step that
+    leads here and the time `elapsed` [s] in it, and with "viscosity" nu [m^2/s].
+
+    Only entries near a due particle are filled in a step. `padding` entries behind the last may be read by loops of
+    constant length; they count for nothing.
+    """
+
+    transient = frozenset({"x", "v", "rho", "p_over_rho2", "a", "elapsed", "viscosity", "geometry"})
+
+    def __init__(
+        self, count: int, dim: int, backend: Backend, needs: Set[str] = frozenset(), geometry: Any = None
+    ) -> None:
+        self.count = count
+        self.geometry = geometry
+        self.repeats = geometry is not None and geometry.repeats
+        padded = count + backend.lanes
+        self.x = vector_field(dim, backend.dtype, padded)
+        self.v = vector_field(dim, backend.dtype, padded)
+        self.rho = ti.field(backend.dtype, padded)
+        self.p_over_rho2 = ti.field(backend.dtype, padded)
+        self.has_acceleration = "acceleration" in needs
+        self.has_viscosity = "viscosity" in needs
+        if self.has_acceleration:
+            self.a = vector_field(dim, backend.dtype, padded)
+            self.elapsed = ti.field(backend.dtype, padded)
+        if self.has_viscosity:
+            self.viscosity = ti.field(backend.dtype, padded)
+        self.rho.fill(1.0)
+
+    @property
+    def spare(self) -> list[ti.Field]:
+        """Fields that may be written to between steps, (capacity,) or more; a density of 0 would do harm."""
+        return [*components(self.x), *components(self.v), self.p_over_rho2]
+
+    @ti.func
+    def difference(self, i, j):
+        """x_i - x_j [m] of two entries, along periodic axes to the nearest of the images of j."""
+        x_ij = self.x[i] - self.x[j]
+        if ti.static(self.repeats):
+            x_ij = self.geometry.difference(self.x[i], self.x[j])
+        return x_ij

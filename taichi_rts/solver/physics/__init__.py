@@ -1,0 +1,1 @@
+"""Densities, forces and walls, pair by pair."""

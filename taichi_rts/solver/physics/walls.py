@@ -1,0 +1,122 @@
+"""Wall boundary particles after Akinci et al. 2012.
+
+Why this one and not Adami et al. 2012: its wall particles carry a volume and no state. Nothing has to be extrapolated to
+them, so a wall is valid at every time: just what particles that all live at different times need. And its pressure force
+derives from the same energy as the fluid's, so a wall at rest does no work.
+
+Akinci's V_b = 1 / sum_k W_bk makes up for what a single layer lacks, seen from the wall. For the even faces of the domain
+`sampling/walls.calibrate_walls` works it out as seen from fluid at rest on them.
+"""
+
+import copy
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+from taichi_rts.device.backend import Backend
+from taichi_rts.device.counts import CELLS_PER_BLOCK
+from taichi_rts.sampling.walls import WallLayer
+from taichi_rts.solver.grid.geometry import Geometry
+from taichi_rts.solver.particles.fields import Rows, Values, vector_field
+from taichi_rts.solver.particles.neighbourhood import Neighbourhood
+
+LARGEST_SHEAR = 4.0
+
+
+@ti.data_oriented
+class Walls:
+    """Wall particles at rest, sorted into the grid's cells once.
+
+    Positions x [m], volumes [m^dim], and normals into the fluid; `near` flags blocks that see one.
+    """
+
+    moves = False
+    transient = frozenset(
+        {"x", "volume", "normal", "depth", "stiffness", "start", "near", "shift", "speed", "windows", "dtype"}
+        | {"depths", "layered"}
+    )
+
+    def __init__(self, layer: WallLayer, fluid: Neighbourhood, geometry: Geometry, backend: Backend) -> None:
+        positions, volumes = layer.positions, layer.volumes
+        self.fluid = fluid
+        self.geometry = geometry
+        self.dtype = backend.dtype
+        self.windows: Any = None  # see `windows.py`
+        self.count = len(positions)
+        cell = geometry.cell_numpy(positions)
+        order = np.argsort(cell, kind="stable")
+        start = np.searchsorted(cell[order], np.arange(geometry.cells + 1))
+        near = geometry.spread(np.diff(start[::CELLS_PER_BLOCK]) > 0)
+        padded = self.count + backend.lanes
+        self.x = vector_field(geometry.dim, backend.dtype, padded)
+        self.volume = ti.field(backend.dtype, padded)
+        self.normal = vector_field(geometry.dim, backend.dtype, padded)
+        self.depth = layer.depth
+        self.stiffness = layer.stiffness
+        self.layered = bool((layer.depths != layer.depth).any())
+        if self.layered:
+            self.depths = ti.field(backend.dtype, padded)
+            self.depths.from_numpy(np.pad(layer.depths[order], (0, backend.lanes)).astype(backend.numpy_dtype))
+        self.start = ti.field(ti.i32, geometry.cells + 1)
+        self.near = ti.field(ti.i32, geometry.blocks)
+        sorted_ = (values[order].astype(backend.numpy_dtype) for values in (positions, volumes, layer.normals))
+        self.load(*sorted_, start.astype(np.int32), near.astype(np.int32))
+
+    @ti.kernel
+    def load(self, x: Rows, volume: Values, normal: Rows, start: Values, near: Values):
+        """Take these over; one kernel compiles quicker than many assignments."""
+        for b in range(x.shape[0]):
+            self.volume[b] = volume[b]
+            for d in ti.static(range(self.x.n)):
+                self.x[b][d], self.normal[b][d] = x[b, d], normal[b, d]
+        for cell in self.start:
+            self.start[cell] = start[cell]
+        for block in self.near:
+            self.near[block] = near[block]
+
+    def room_for(self, count: int) -> "Walls":
+        """Return the same with room for `count` particles, none of which is there yet."""
+        other = copy.copy(self)
+        other.x, other.normal = (vector_field(self.geometry.dim, self.dtype, count) for _ in range(2))
+        other.volume = ti.field(self.dtype, count)
+        if self.layered:
+            other.depths = ti.field(self.dtype, count)
+        return other
+
+    @ti.func
+    def seen_from(self, k, cell):
+        """Position [m] and cell, among the wall particles, of the fluid particle at place `k` in `cell`."""
+        return self.fluid.x[k], cell
+
+    @ti.func
+    def difference(self, k, b):
+        """x_k - x_b [m] between the fluid at place `k` and wall particle `b`."""
+        return self.geometry.difference(self.fluid.x[k], self.x[b])
+
+    @ti.func
+    def relative_velocity(self, k, b):
+        """v_k - v_b [m/s]."""
+        return self.fluid.v[k]
+
+    @ti.func
+    def facing(self, k, b):
+        """Normal of wall particle `b`, for the fluid at place `k`."""
+        return self.normal[b]
+
+    @ti.func
+    def shear(self, k, b, x_ib):
+        """How much faster than fluid at x_ib [m] from particle `b` that fluid moves past the wall's far side, per its speed.
+
+        With (d_i + d_b)/d_i, d_i and d_b being the distances to the face, velocities go through zero on the face (Morris, Fox &
+        Zhu 1997, Eq. 23), and a linear profile along a resting lattice feels no force, as it should. Bounded, because fluid
+        may come arbitrarily close: no nearer than d_b/3 counts, d_b being that of the plane next to the face. And at least
+        once: a particle of an obstacle that faces away, round an edge or on a plate's other side, has the obstacle's speed.
+        """
+        distance = self.facing(k, b).dot(x_ib)
+        depth, largest = self.depth, LARGEST_SHEAR
+        if ti.static(self.layered):
+            depth = self.depths[b]
+            largest = 1.0 + (LARGEST_SHEAR - 1.0) / self.depth * depth
+        ratio = ti.min(distance / ti.max(distance - depth, 1e-3 * depth), largest)
+        return ti.max(ratio, 1.0) / self.stiffness

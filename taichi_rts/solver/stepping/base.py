@@ -1,0 +1,141 @@
+"""What a stepper is: a frozen description that users write, and a schedule that says who is due."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Protocol
+
+import taichi as ti
+from pydantic import Field
+
+from taichi_rts.scene.scene import Scene
+from taichi_rts.solver.grid.grid import BlockGrid
+from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.stepping.timeline import Timeline
+
+Courant = Annotated[float, Field(gt=0, le=2)]
+
+
+class Stepper(Protocol):
+    """A stepper's parameters, and how they become a schedule for one run. To add one, write one file like `uniform.py`."""
+
+    name: ClassVar[str]
+
+    @property
+    def follows_sound(self) -> bool:
+        """Whether steps follow the sound speed of each region, so that a regional one can pay."""
+
+    @property
+    def extrapolates_density(self) -> bool:
+        """Whether the densities of particles that are not due follow d rho/dt, which then has to be computed."""
+
+    @property
+    def keeps_past(self) -> bool:
+        """Whether particles may be read at times before their last evaluation, so that the state before it is needed."""
+
+    @property
+    def drift(self) -> float:
+        """How far a particle may move, over the support radius, before the grid is sorted anew; 0: every step."""
+
+    def make_integrator(self) -> Any:
+        """Return the integrator, an object as in `taichi_rts.solver.integrators`."""
+
+    def timeline(self, scene: Scene) -> Timeline:
+        """Return the clock for `scene`: its tick divides the base step."""
+
+    def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
+        """Build the fields and kernels that decide who is due."""
+
+
+@ti.data_oriented
+class Schedule:
+    """Who is due in the present step.
+
+    Attributes:
+        due: places (in the grid's order) of the due particles, ascending; `due_count` of them. Those of a block are
+            `due[due_start[block]]` and its `block_due[block]` - 1 successors.
+        read_at: for each block the time at which due particles may read its particles, in ticks after `now`; negative
+            where none does.
+        base_ticks: ticks in one base step.
+        levels: number of levels; level n steps every n base steps.
+        aligned: whether steps end at multiples of themselves.
+        levels_double: whether steps come in octaves rather than one by one, which is how pictures and tables group them.
+        needs_sorting: whether the grid has to be sorted before the present step.
+        sound: the rule of the regional sound speed (`SoundRule`), or None; `needs_sound` says whether it has to be worked out
+            before the present step.
+        steps: base steps begun so far.
+        debug: check at run time what is true by construction.
+    """
+
+    levels = 1
+    levels_double = False
+    aligned = False
+    base_ticks = 1
+    needs_sorting = True
+    needs_sound = True
+    sound: Any = None
+    transient = frozenset({"due", "flag"})
+
+    def __init__(self, particles: Particles, grid: BlockGrid) -> None:
+        self.particles = particles
+        self.grid = grid
+        self.due = grid.rank  # which only a sort needs, and after a sort the list is made anew
+        self.due_count = ti.field(ti.i32, ())
+        self.read_at = ti.field(ti.i32, grid.geometry.blocks)
+        self.steps = 0
+        self.debug = False
+
+    @ti.func
+    def due_in(self, m):
+        """First entry of `due` that lies in the occupied block number `m`, and one past the last."""
+        block = self.grid.occupied[m]
+        return self.due_start[block], self.due_start[block] + self.block_due[block]
+
+    def begin(self, timeline: Timeline, target: int) -> bool:
+        """Set the clock to the next step and return True, unless that step ends after tick `target`.
+
+        What the steps are depends on the state only, never on `target`.
+        """
+        ticks = self.next_ticks()
+        if timeline.now + ticks > target:
+            return False
+        timeline.now += ticks
+        self.steps += 1
+        return True
+
+    def restart(self, now: int) -> None:
+        """Forget steps and levels: at tick `now` everybody is due, as at the start."""
+
+    def next_ticks(self) -> int:
+        """Length of the next step in ticks; it depends on the state only."""
+        return 1
+
+    def sorted(self, now: int, tick: float) -> None:
+        """Take note that the grid has been sorted anew."""
+
+    def select(self, now: int, tick: float) -> None:
+        """Decide who is due at tick `now` (Algorithm 1, lines 5-16)."""
+
+    @ti.func
+    def evaluated(self, i, acceleration, tick):
+        """Take note of the new `acceleration` [m/s^2] of the due particle `i`; `tick` [s]."""
+
+    def observe(self, now: int, tick: float) -> None:
+        """Look at the state after a step, to choose the next."""
+
+    def retime(self, stepper: Any, timeline: Timeline) -> bool:
+        """Take another courant, before the first step: `stepper` has it and else equals the present one.
+
+        Returns whether the compiled kernels serve for it.
+        """
+        return True
+
+    def take_counts(self) -> tuple[list[int], list[int]]:
+        """Return particles and updates per level, each summed over the steps since the last call, and forget them.
+
+        Empty lists stand for "every particle, every step, level 1".
+        """
+        return [], []
+
+    def statistics(self) -> dict[str, Any]:
+        """Return what else this stepper has to say about the work so far."""
+        return {}

@@ -1,0 +1,1 @@
+"""Runs that are tried out: until they blow up, again and again, in other processes."""

@@ -1,0 +1,97 @@
+import os
+import subprocess
+import sys
+
+import pytest
+import taichi as ti
+
+import taichi_rts as rts
+from taichi_rts.device import backend
+
+
+def test_unknown_arch_and_precision_list_the_choices():
+    with pytest.raises(rts.BackendError, match="arch 'gpu' is unknown; choose one of auto, cuda, vulkan, cpu"):
+        rts.init("gpu")
+    with pytest.raises(rts.BackendError, match="precision 'f16' is unknown; choose one of f32, f64"):
+        rts.init("cpu", "f16")
+
+
+def test_missing_cuda_is_one_error_that_names_the_remedy():
+    if ti.lang.misc.is_arch_supported(ti.cuda):
+        pytest.skip("this machine has CUDA")
+    with pytest.raises(rts.BackendError, match=r"'cuda' is not available on this machine; .* --arch cpu"):
+        rts.init("cuda")
+    assert "--arch cpu" in backend.available()["cuda"]
+
+
+def test_missing_vulkan_is_one_error_that_names_the_remedy(monkeypatch):
+    monkeypatch.setattr(backend, "vulkan_device_types", list)
+    with pytest.raises(rts.BackendError, match=r"'vulkan' is not available on this machine; .* --arch cpu"):
+        rts.init("vulkan")
+    assert "--arch cpu" in backend.available()["vulkan"]
+
+
+def test_auto_passes_over_software_vulkan(start_taichi, monkeypatch):
+    if ti.lang.misc.is_arch_supported(ti.cuda):
+        pytest.skip("this machine has CUDA")
+    monkeypatch.setattr(backend, "vulkan_device_types", lambda: [4])
+    with start_taichi("auto") as started:
+        assert started.arch == "cpu"
+
+
+@pytest.mark.parametrize("precision", ["f32", "f64"])
+def test_precision_reaches_taichi(start_taichi, precision):
+    with start_taichi("cpu", precision) as started:
+        assert backend.current() is started
+        assert started.dtype is getattr(ti, precision)
+        assert started.numpy_dtype.__name__ == {"f32": "float32", "f64": "float64"}[precision]
+        assert ti.field(float, ()).dtype == started.dtype
+
+
+def test_simulation_before_init_says_what_to_call(monkeypatch):
+    monkeypatch.setattr(backend, "_current", None)
+    with pytest.raises(rts.BackendError, match=r"not initialised; call taichi_rts\.init"):
+        rts.Simulation(rts.load_scene("dam_break_2d"))
+
+
+def test_importing_starts_nothing():
+    code = (
+        "import taichi_rts as rts; import taichi as ti; from taichi_rts import backend\n"
+        "rts.load_scene('dam_break'); rts.Regional()\n"
+        "assert ti.lang.impl.get_runtime().prog is None and backend._current is None"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    assert "[Taichi]" not in result.stdout
+
+
+def test_public_names_exist():
+    for name in rts.__all__:
+        assert getattr(rts, name) is not None
+    errors = [value for name in rts.__all__ if isinstance(value := getattr(rts, name), type) and "Error" in name]
+    assert len(errors) >= 8
+    assert all(issubclass(error, rts.Error) for error in errors)
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="Linux only")
+def test_threads_have_a_core_each_where_there_is_one_for_every_core(taichi_cpu):
+    cores = os.sched_getaffinity(0)
+    pinned = [os.sched_getaffinity(int(thread)) for thread in os.listdir("/proc/self/task")]
+    if backend.threads() == len(cores) > 1:
+        assert {core for each in pinned if len(each) == 1 for core in each} == cores
+    assert os.sched_getaffinity(0) == cores  # the caller itself stays free
+
+
+def test_fewer_threads_than_cores_are_free_to_move(monkeypatch):
+    calls = []
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1, 2}, raising=False)
+    monkeypatch.setattr(os, "sched_setaffinity", lambda thread, cores: calls.append((thread, cores)), raising=False)
+    monkeypatch.setattr(backend, "threads", lambda: 2)
+    backend._pin_threads([11, 12, 13])
+    assert calls == []
+    monkeypatch.setattr(backend, "threads", lambda: 3)
+    backend._pin_threads([10, 11, 12, 13])
+    assert calls == [(11, {0}), (12, {1}), (13, {2})]
+    monkeypatch.setenv("TAICHI_RTS_PIN", "0")
+    backend._pin_threads([11, 12, 13])
+    assert len(calls) == 3
