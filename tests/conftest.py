@@ -102,4 +102,4 @@ def simulate(kernel_cache):
 @pytest.fixture
 def unstarted(monkeypatch):
     """Simulations evaluate no first forces, so that next to nothing is compiled: for what they know before."""
-    monkeypatch.setattr(rts.Simulation, "_start", lambda sim: None)
+    monkeypatch.setattr(rts.Simulation, "start", lambda sim: None)
