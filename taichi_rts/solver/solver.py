@@ -47,7 +47,7 @@ class Solver:
     counted_in: float = 0.0
 
     def count_in(self, tick: float) -> None:
-        """Let all that the scene moves be counted in ticks of this length [s]; another courant has another, on the same kernels."""
+        """Let all that the scene moves be counted in ticks of this length [s]; another courant has another one."""
         if tick != self.counted_in:
             self.counted_in = tick
             for part in self.ticking:
