@@ -30,7 +30,7 @@ class Rerun:
         if sim is not None and self.start is not None:
             self.start.restore()
             sim.stepper, sim.solver.timeline = stepper, stepper.timeline(scene)
-            if sim.scene is not scene or not sim.schedule.retime(stepper, sim.timeline):
+            if sim.scene is not scene or not sim.schedule.retime(stepper.in_scene(scene), sim.timeline):
                 sim = None
         if sim is None:
             self.fresh()

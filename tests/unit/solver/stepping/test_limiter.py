@@ -9,7 +9,7 @@ from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.grid.surroundings import Surroundings
 from taichi_rts.solver.particles.particles import Particles
 from taichi_rts.solver.stepping.limiter import EMPTY, Ladder, NeighbourLimiter, Sweep
-from taichi_rts.solver.stepping.regions import lengths
+from taichi_rts.solver.stepping.settled import lengths
 
 
 def random_levels(geometry, n_max=5, seed=0):
