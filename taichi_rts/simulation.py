@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, cast
 
 import numpy as np
-import taichi as ti
 from PIL import Image
 
 from taichi_rts.assembly.build import DENSITIES
@@ -21,6 +20,7 @@ from taichi_rts.assembly.resources import require
 from taichi_rts.assembly.walls import make_keepers, make_walls
 from taichi_rts.assembly.work import Overhead, Tally
 from taichi_rts.device import backend as backends
+from taichi_rts.device.backend import ti
 from taichi_rts.device.ownership import guarded
 from taichi_rts.errors import Error, Interrupted, SimulationDivergedError, TimeError
 from taichi_rts.medium.energy import Energy, measure_energy

@@ -2,8 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.particles.particles import Particles

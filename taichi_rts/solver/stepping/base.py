@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, Protocol
 
-import taichi as ti
 from pydantic import Field
 
+from taichi_rts.device.backend import ti
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.particles.particles import Particles

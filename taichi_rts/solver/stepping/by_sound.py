@@ -2,8 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.aligned import AlignedBlocks
 from taichi_rts.solver.stepping.timeline import Timeline
