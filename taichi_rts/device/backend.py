@@ -197,7 +197,7 @@ def _remember(backend: Backend, asked_for: str, options: dict[str, Any]) -> Back
 def _running(arch: str, precision: str | None) -> Backend:
     """Return what `ti.init` has started; raises `BackendError` if there is nothing, or it is not as asked for or as needed."""
     runtime = ti.lang.impl.get_runtime()
-    if runtime.prog is None:
+    if ownership.program(runtime) is None:
         raise BackendError("there is no Taichi to reuse; call ti.init first, or leave out reuse")
     found = {getattr(ti, name): name for name in ARCHES}.get(ti.lang.impl.current_cfg().arch)
     if found is None or arch not in ("auto", found):

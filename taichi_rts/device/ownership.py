@@ -45,7 +45,7 @@ class Start:
     @property
     def lives(self) -> bool:
         """Whether Taichi has neither been started again nor reset since."""
-        return _runtime() is self._runtime and self._runtime.prog is not None
+        return _runtime() is self._runtime and program(self._runtime) is not None
 
     @property
     def is_here(self) -> bool:
@@ -80,9 +80,10 @@ def require_own_process() -> None:
 def holds_fields() -> bool:
     """Whether anything would be lost if Taichi were started again: fields or arrays, of whoever made them."""
     runtime = _runtime()
-    if runtime.prog is None:
+    started = program(runtime)
+    if started is None:
         return False
-    if runtime.prog.get_snode_tree_size() or runtime.global_vars or not _taichi.lang.impl.root.empty:
+    if started.get_snode_tree_size() or runtime.global_vars or not _taichi.lang.impl.root.empty:
         return True
     # Taichi keeps no list of its arrays.
     return any(
@@ -107,6 +108,15 @@ def guarded(*plain: str) -> Callable[[T], T]:
     return decorate
 
 
+def program(runtime: Any) -> Any:
+    """Return what Taichi has started, None if nothing."""
+    return getattr(runtime, _program_name(runtime))
+
+
+def _program_name(runtime: Any) -> str:
+    return "_prog" if hasattr(runtime, "_prog") else "prog"  # quadrants' `prog` raises where there is none
+
+
 def _runtime() -> Any:
     return _taichi.lang.impl.get_runtime()  # a new object after each `ti.init` and `ti.reset`
 
@@ -124,8 +134,9 @@ def _forget_in_child() -> None:
     """In a forked child let go of Taichi's program: to use it, and even to end it, waits for threads that there are not."""
     global _lost
     runtime = _runtime()
-    if runtime.prog is not None:
+    started = program(runtime)
+    if started is not None:
         _lost = True
         with contextlib.suppress(AttributeError):  # no CPython
-            ctypes.pythonapi.Py_IncRef(ctypes.py_object(runtime.prog))  # so that its destructor never runs
-        runtime.prog = None
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(started))  # so that its destructor never runs
+        setattr(runtime, _program_name(runtime), None)
