@@ -4,9 +4,9 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import taichi as ti
 
 import taichi_rts as rts
+from taichi_rts.device.backend import ti
 
 sys.path.append(str(Path(__file__).parents[1] / "validation"))
 from test_wide_supports import CALM, DEPTH, SPACING, rest

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, cast
 
 import numpy as np
-import taichi as ti
 from PIL import Image
 
 from taichi_rts.assembly.build import assemble
@@ -17,6 +16,7 @@ from taichi_rts.assembly.obstacle_forces import ForceMeter, ObstacleForces
 from taichi_rts.assembly.resources import require
 from taichi_rts.assembly.work import Overhead, Tally
 from taichi_rts.device import backend as backends
+from taichi_rts.device.backend import ti
 from taichi_rts.device.ownership import guarded
 from taichi_rts.errors import Error, Interrupted, SimulationDivergedError, TimeError
 from taichi_rts.medium.energy import Energy, measure_energy

@@ -7,9 +7,9 @@ import math
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
 from taichi_rts.assembly.work import Tally
+from taichi_rts.device.backend import ti
 from taichi_rts.simulation import Simulation
 from taichi_rts.solver.physics.timetable import LAST
 from taichi_rts.solver.stepping.base import Stepper

@@ -12,9 +12,8 @@ import copy
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
-from taichi_rts.device.backend import Backend
+from taichi_rts.device.backend import Backend, ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.sampling.walls import WallLayer
 from taichi_rts.solver.grid.geometry import Geometry

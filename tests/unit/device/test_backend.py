@@ -3,10 +3,10 @@ import subprocess
 import sys
 
 import pytest
-import taichi as ti
 
 import taichi_rts as rts
 from taichi_rts.device import backend
+from taichi_rts.device.backend import ti
 
 
 def test_unknown_arch_and_precision_list_the_choices():
@@ -56,7 +56,7 @@ def test_simulation_before_init_says_what_to_call(monkeypatch):
 
 def test_importing_starts_nothing():
     code = (
-        "import taichi_rts as rts; import taichi as ti; from taichi_rts import backend\n"
+        "import taichi_rts as rts; from taichi_rts.device import backend; from taichi_rts.device.backend import ti\n"
         "rts.load_scene('dam_break'); rts.Regional()\n"
         "assert ti.lang.impl.get_runtime().prog is None and backend._current is None"
     )
