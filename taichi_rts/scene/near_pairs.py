@@ -18,9 +18,8 @@ def near_pairs(
     Positions `x` and `others` [m] are (N, dim) and (M, dim); without `others` pairs are within `x`: each then comes twice, and
     every particle once with itself. Images across periodic faces are not looked at.
     """
-    from scipy.spatial import (
-        cKDTree,
-    )  # not at the top: most runs need no pairs, and its import takes longer than NumPy's
+    # Not at the top: most runs need no pairs, and its import takes longer than NumPy's.
+    from scipy.spatial import cKDTree
 
     one = x.astype(np.float64)
     two = one if others is None else others.astype(np.float64)

@@ -339,8 +339,7 @@ def _turn_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Rotation [rad] that leads from the rotation `a` to `b`, both like the argument of `rotation_matrix`."""
     if len(a) == 1 or np.linalg.norm(np.cross(a, b)) < 1e-12:
         return b - a
-    from scipy.spatial.transform import (
-        Rotation,
-    )  # not at the top: its import takes longer than NumPy's, and few scenes come here
+    # Not at the top: few scenes come here, and its import takes longer than NumPy's.
+    from scipy.spatial.transform import Rotation
 
     return (Rotation.from_rotvec(b) * Rotation.from_rotvec(a).inv()).as_rotvec()
