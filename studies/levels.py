@@ -1,5 +1,5 @@
 """Every combination of levels, steps, grading, limiter and sound speed of `Regional` in a small impact: the table of
-docs/stability.md.
+docs/evidence/stability.md.
 
 python studies/levels.py: each as a debug run, in which no particle may be late; about 40 minutes on 2 cores. What is
 done is kept in out/levels.json; a second call goes on from there.

@@ -1,4 +1,4 @@
-"""Runs the validation cases and prints the table of docs/validation.md: python studies/validation.py [case ...].
+"""Runs the validation cases and prints the table of docs/evidence/validation.md: python studies/validation.py [case ...].
 
 All of it takes about 12 minutes on 2 cores.
 """

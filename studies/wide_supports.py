@@ -1,4 +1,4 @@
-"""A still pool at wide supports, for docs/validation.md: python studies/wide_supports.py."""
+"""A still pool at wide supports, for docs/evidence/validation.md: python studies/wide_supports.py."""
 
 import sys
 from pathlib import Path

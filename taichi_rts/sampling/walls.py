@@ -22,7 +22,7 @@ WALL_STIFFNESS = 4.0 / 3.0
 1 continues the lattice: a pool 10 particles deep settles 3.5 % too low, and 2,300 centres hit the faces of the domain in a
 double dam break. 2 balances a particle at rest on the wall exactly, but is so stiff that the same dam break throws particles
 at 47 m/s at courant 0.4 and blows up at 0.6. 4/3 settles 1.2 % too low, keeps every centre off the faces, and survives both
-(docs/defaults.md).
+(docs/evidence/defaults.md).
 Wider supports have flatter profiles, so there the factor grows with r/2s (`wall_stiffness`).
 With an integrated density the walls' pressure is mirrored and 1 is right (`continuity.MirroredPressure`).
 """

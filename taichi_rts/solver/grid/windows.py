@@ -3,7 +3,7 @@
 On a GPU a thread has a particle and walks over the rows of cells around it. On a CPU a thread has a run of blocks along x. It
 gathers what lies in them and around them into a window: the nine rows of blocks (three in two dimensions) that surround the run,
 column of cells by column of cells, one array for each quantity. What lies near a particle is then one contiguous range, over
-which LLVM makes vector instructions with a single sum at the end (docs/speed.md has the figures).
+which LLVM makes vector instructions with a single sum at the end (docs/evidence/speed.md has the figures).
 """
 
 import math
