@@ -22,7 +22,7 @@ from taichi_rts.solver.particles.neighbourhood import Neighbourhood
 
 LARGEST_SHEAR = 4.0
 LARGEST_SHEAR_LAYERED = 6.0
-"""Where walls have several planes: the first may lie 2.2 spacings deep (r = 4s), and fluid at rest on the face half a spacing from
+"""Of several planes the first may lie 2.2 spacings deep (r = 4s), and fluid at rest on the face, half a spacing from
 it must still count as it is."""
 
 
