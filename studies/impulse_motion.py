@@ -17,7 +17,10 @@ from taichi_rts.grid import make_neighbour_sum
 from taichi_rts.motion import Motion
 from taichi_rts.particles import components, vector_field
 from taichi_rts.physics.walls import make_wall_sum
+from taichi_rts.stepping.base import Schedule
 
+TOLD = hasattr(Schedule, "evaluated")
+"""Whether schedules want to know new accelerations."""
 SETTINGS = {"position": "impulse"}
 """How a position is corrected: "impulse", by what its velocity got, or "serna", by its own new acceleration."""
 
@@ -170,11 +173,16 @@ class ImpulseMotion(Motion):
             self.particles.updated[i] = now
             self.end[i] = self.planned[k]
             self.owed[i] = self.opening[k] + ahead * (a_walls + outer)
+            if ti.static(TOLD):
+                due.evaluated(i, a_new, tick)
 
 
 @contextlib.contextmanager
-def pairwise_impulses(position="impulse"):
+def pairwise_impulses(position="impulse", on=True):
     """Let simulations that are built inside have pairwise impulses."""
+    if not on:
+        yield
+        return
     make_walls, before = simulation.make_walls, simulation.Motion
     made = []
 
