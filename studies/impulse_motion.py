@@ -1,7 +1,7 @@
 """A force pass that gives both partners of a pair the same impulse, however different their steps: see pairwise_impulses.py.
 
-A pair is evaluated whenever one of its particles is due, and each time both get equal and opposite velocities. They are paid up to
-the middle of the pair's present step: from its last evaluation to when the earlier of the two is planned to be due next. So an
+A pair is evaluated whenever one of its particles is due, and each time both get equal and opposite velocities. They are paid up
+to the middle of the pair's present step: from its last evaluation to when the earlier of the two is planned to be due next. So an
 evaluation at time t pays w = P' - P seconds of the force, where P was the middle of the pair's step before and P' is that of its
 next. With one step for all that is half a step behind and half a step ahead, Serna's trapezium. Whatever the steps become,
 w is the same for both partners, and all w of a pair add up to the time that has passed.
@@ -29,14 +29,16 @@ SETTINGS = {"position": "impulse"}
 class ImpulseMotion(Motion):
     """`Motion` for `Regional` and one evaluation at a time of each pair, at the step of its faster partner.
 
-    Between its evaluations a particle moves as ever, with the acceleration of the last. What it gets meanwhile from due neighbours
-    waits in `owed` until it is due itself. Gravity and walls, who owe nobody anything, act with the particle's own steps.
+    Between its evaluations a particle moves as ever, with the acceleration of the last. What it gets meanwhile from due
+    neighbours waits in `owed` until it is due itself. Gravity and walls, who owe nobody anything, act with the particle's own steps.
     """
 
     def __init__(self, particles, near, grid, momentum, *rest, walls=(), **options):
         super().__init__(particles, near, grid, momentum, *rest, **options)
         if self.integrates_density or self.moving_walls or self.obstacles or particles.has_past or particles.has_guide:
-            raise NotImplementedError("only summed density, walls at rest, no obstacles, no inflows, no asynchronous cells")
+            raise NotImplementedError(
+                "only summed density, walls at rest, no obstacles, no inflows, no asynchronous cells"
+            )
         backend, capacity, dim = backends.current(), particles.capacity, particles.dim
         self.impulse_moves = SETTINGS["position"] == "impulse"
         self.width = momentum.width

@@ -1,8 +1,8 @@
 """Do pairwise impulses at borders between levels pay? The figures of docs/pairwise_impulses.md.
 
-python studies/pairwise_impulses.py [dams|dams_3d|impact|pool|dams_sound|impact_sound ...] takes about 10 minutes on 2 cores.
+python studies/pairwise_impulses.py [dams|dams_3d|impact|dams_sound|impact_sound|pool|drop ...] [paper ...] takes about 10 minutes on 2 cores.
 
-The variant is in impulse_motion.py. Every setting runs as it is and with it, with densities of the last evaluation ("stale") and
+With names of steppers (default, paper, "6 levels at 0.1") only those. The variant is in impulse_motion.py. Every setting runs as it is and with it, with densities of the last evaluation ("stale") and
 extrapolated ones, beside `Uniform` with a step of a quarter of the shortest base step. Everything is in double precision.
 """
 
@@ -16,10 +16,21 @@ from taichi_rts.compare.measures import Yardstick, centre_of_mass, kinetic_energ
 from taichi_rts.compare.trajectory import Trajectory
 from taichi_rts.neighbours import near_pairs
 
-SAMPLES = 25
-COLUMNS = (
-    "stepper", "λ_f", "density", "pairs", "updates [k]", "partial [k]", "drift", "owed", "energy", "kinetic", "centre", "v", "noise",
-)  # fmt: skip
+COLUMNS = [
+    "stepper",
+    "λ_f",
+    "density",
+    "pairs",
+    "updates [k]",
+    "partial [k]",
+    "drift",
+    "owed",
+    "energy",
+    "kinetic",
+    "centre",
+    "v",
+]
+COLUMNS += ["noise", "share of updates by level"]
 
 
 def impact(sound_speed):
@@ -30,23 +41,22 @@ def impact(sound_speed):
     return rts.Scene(name="impact", spacing=0.025, domain=domain, fluids=(pool, block), sound_speed=sound_speed)
 
 
-def steppers():
-    """The settings that are compared, by name, as functions of lambda_f and the rest."""
-    return {
-        "default": lambda **o: rts.Regional(**o),
-        "6 levels at 0.1": lambda **o: rts.Regional(courant=0.1, levels=6, steps="integers", **o),
-        "paper": lambda **o: rts.Regional(preset="paper", **o),
-    }
+STEPPERS = {
+    "default": lambda **o: rts.Regional(**o),
+    "6 levels at 0.1": lambda **o: rts.Regional(courant=0.1, levels=6, steps="integers", **o),
+    "paper": lambda **o: rts.Regional(preset="paper", **o),
+}
+"""What is compared, as functions of lambda_f and the rest."""
 
 
 SCENES = {
-    "dams": (lambda: rts.load_scene("double_dam_break_2d", spacing=0.04), 1.0, 1.0),
-    "dams_3d": (lambda: rts.load_scene("double_dam_break", spacing=0.08), 1.0, 1.0),
-    "impact": (lambda: impact(40.0), 0.1, None),
-    "dams_sound": (lambda: rts.load_scene("double_dam_break_2d", spacing=0.04, sound_speed="regional"), 1.0, 1.0),
-    "impact_sound": (lambda: impact("regional"), 0.1, None),
+    "dams": (lambda: rts.load_scene("double_dam_break_2d", spacing=0.04), 1.0, 1.0, 50),
+    "dams_3d": (lambda: rts.load_scene("double_dam_break", spacing=0.08), 1.0, 1.0, 25),
+    "impact": (lambda: impact(40.0), 0.1, None, 25),
+    "dams_sound": (lambda: rts.load_scene("double_dam_break_2d", spacing=0.04, sound_speed="regional"), 1.0, 1.0, 25),
+    "impact_sound": (lambda: impact("regional"), 0.1, None, 25),
 }
-"""Scene, end time [s], and H [m] of the scale m sqrt(gH) of momentum; None: the scale is the momentum of the block."""
+"""Scene, end time [s], H [m] of the scale m sqrt(gH) of momentum (None: the scale is the momentum of the block), samples."""
 
 
 def noise(x, rho, support, rest):
@@ -63,7 +73,7 @@ class Run:
     """What a run had at its samples."""
 
     def __init__(self, name, stepper, impulses=False, position="impulse"):
-        make, end_time, height = SCENES[name]
+        make, end_time, height, samples = SCENES[name]
         scene = make()
         with pairwise_impulses(position, on=impulses):
             sim = rts.Simulation(scene, stepper, debug=True)
@@ -72,7 +82,7 @@ class Run:
         scale = sim.medium.mass * sim.count * np.sqrt(9.81 * (height or 1.0))
         if height is None:
             scale = np.linalg.norm(sim.momentum())
-        for time in np.linspace(0.0, end_time, SAMPLES + 1):
+        for time in np.linspace(0.0, end_time, samples + 1):
             sim.advance_to(time)
             x, v, rho, _ = sim.state()
             self.path.append(time, x, v, rho, sim.pressures(), sim.energy())
@@ -91,7 +101,10 @@ class Run:
             return [f"{self.updates / 1e3:.0f}", f"{self.partial / 1e3:.0f}", "blown up", *[""] * 6]
         gain = np.sqrt(np.mean(((self.energy - reference.energy) / reference.energy[0])[1:] ** 2))
         last = (self.energy[-1] - reference.energy[-1]) / reference.energy[0]
-        measures = [measure(self.path, reference.path, scale, together) for measure in (kinetic_energy, centre_of_mass, velocities)]
+        measures = [
+            measure(self.path, reference.path, scale, together)
+            for measure in (kinetic_energy, centre_of_mass, velocities)
+        ]
         return [
             f"{self.updates / 1e3:.0f}",
             f"{self.partial / 1e3:.0f}",
@@ -108,8 +121,8 @@ def show(*cells):
     print("| " + " | ".join(map(str, cells)) + " |", flush=True)
 
 
-def table(name):
-    """Print the table of one scene."""
+def table(name, chosen):
+    """Print the table of one scene, with the `chosen` settings."""
     sound = name.endswith("_sound")
     uniform = {f"uniform {c:g}": rts.Uniform(courant=c, adaptive=sound) for c in (0.05, 0.1, 0.4, 0.6)}
     runs = {label: Run(name, stepper) for label, stepper in uniform.items()}
@@ -121,9 +134,8 @@ def table(name):
     show(*["---"] * len(COLUMNS))
     for label, run in runs.items():
         show(label, "", "", "", *run.cells(reference, scale, together))
-    for label, make in steppers().items():
-        if sound and label != "default":
-            continue
+    for label in ["default"] if sound else chosen:
+        make = STEPPERS[label]
         for lambda_f in (0.1, 0.25):
             for density in ("stale", "extrapolated"):
                 stepper = make(lambda_f=lambda_f, inactive_density=density)
@@ -132,14 +144,15 @@ def table(name):
                     show(label, lambda_f, density, pairs, *run.cells(reference, scale, together), run.levels)
 
 
-def pool():
+def pool(chosen):
     """How calm a pool in two dimensions stays that rests: rms speed over sqrt(gH) from 2 to 3 s."""
     block, domain = rts.Block(lower=(0.0, 0.0), upper=(1.0, 0.5)), rts.Box(lower=(0.0, 0.0), upper=(1.0, 1.0))
     scene = rts.Scene(name="pool", spacing=0.025, domain=domain, fluids=(block,))
     print("\npool\n")
     show("stepper", "λ_f", "density", "own pairs", "impulses", "updates [k], own", "impulses")
     show(*["---"] * 7)
-    for label, make in steppers().items():
+    for label in chosen:
+        make = STEPPERS[label]
         for lambda_f in (0.1, 0.25):
             for density in ("stale", "extrapolated"):
                 speeds, work = [], []
@@ -155,7 +168,38 @@ def pool():
                 show(label, lambda_f, density, *speeds, *work)
 
 
+def drop(_chosen):
+    """Error and order of a smooth flow without walls, `oscillating_drop`: velocities at 0.3 s, as in convergence.py."""
+    scene, courants = rts.load_scene("oscillating_drop", spacing=0.1), (0.4, 0.2, 0.1)
+
+    def end(stepper, impulses=False):
+        with pairwise_impulses(on=impulses):
+            sim = rts.Simulation(scene, stepper)
+        sim.advance_to(0.3)
+        return sim.velocities(), sim.statistics["particle_updates"] / sim.count
+
+    reference, _ = end(rts.Uniform(courant=0.4 / 32))
+    print("\ndrop\n")
+    show("density", "pairs", *(f"longest step {c:g}" for c in courants), "order", "updates at 0.4")
+    show(*["---"] * 7)
+    for density in ("stale", "extrapolated"):
+        for impulses in (False, True):
+            errors, work = [], []
+            for c in courants:
+                options = {"alpha": c / 2, "lambda_f": c / 32, "inactive_density": density}
+                v, updates = end(rts.Regional(courant=c / 3, levels=3, **options), impulses)
+                errors.append(np.linalg.norm(v - reference) / np.linalg.norm(reference))
+                work.append(updates)
+            order = np.log(errors[0] / errors[-1]) / np.log(courants[0] / courants[-1])
+            pairs = "impulses" if impulses else "own"
+            show(density, pairs, *(f"{error:.1e}" for error in errors), f"{order:.2f}", f"{work[0]:.0f}")
+
+
+PARTS = {"pool": pool, "drop": drop}
+
 if __name__ == "__main__":
     rts.init("cpu", precision="f64")
-    for part in sys.argv[1:] or ["dams", "dams_3d", "impact", "pool", "dams_sound", "impact_sound"]:
-        pool() if part == "pool" else table(part)
+    words = sys.argv[1:]
+    chosen = [word for word in words if word in STEPPERS] or list(STEPPERS)
+    for part in [word for word in words if word not in STEPPERS] or [*SCENES, *PARTS]:
+        PARTS[part](chosen) if part in PARTS else table(part, chosen)
