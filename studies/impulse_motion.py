@@ -1,10 +1,9 @@
 """A force pass that gives both partners of a pair the same impulse, however different their steps: see pairwise_impulses.py.
 
 A pair is evaluated whenever one of its particles is due, and each time both get equal and opposite velocities. They are paid up
-to the middle of the pair's present step: from its last evaluation to when the earlier of the two is planned to be due next. So an
-evaluation at time t pays w = P' - P seconds of the force, where P was the middle of the pair's step before and P' is that of its
-next. With one step for all that is half a step behind and half a step ahead, Serna's trapezium. Whatever the steps become,
-w is the same for both partners, and all w of a pair add up to the time that has passed.
+to the middle of the pair's present step: from its last evaluation to when the earlier of the two is planned to be due next.
+So an evaluation pays half of the pair's step behind it and half of that ahead: Serna's trapezium. Where a step ends early, what
+was paid for the rest of it goes back. Whatever the steps become, both partners get the same.
 """
 
 import contextlib
@@ -16,13 +15,16 @@ from taichi_rts import simulation
 from taichi_rts.grid import make_neighbour_sum
 from taichi_rts.motion import Motion
 from taichi_rts.particles import components, vector_field
+from taichi_rts.physics.viscosity import viscosity_terms
 from taichi_rts.physics.walls import make_wall_sum
 from taichi_rts.stepping.base import Schedule
 
 TOLD = hasattr(Schedule, "evaluated")
 """Whether schedules want to know new accelerations."""
-SETTINGS = {"position": "impulse"}
-"""How a position is corrected: "impulse", by what its velocity got, or "serna", by its own new acceleration."""
+SETTINGS = {"position": "impulse", "recalls": True}
+"""How a position is corrected: "impulse", by what its velocity got, or "serna", by its own new acceleration; and whether a pair
+that was paid for a longer step than it had gets the difference back by the old force, worked out again, or by the new one.
+"""
 
 
 @ti.data_oriented
@@ -30,23 +32,27 @@ class ImpulseMotion(Motion):
     """`Motion` for `Regional` and one evaluation at a time of each pair, at the step of its faster partner.
 
     Between its evaluations a particle moves as ever, with the acceleration of the last. What it gets meanwhile from due
-    neighbours waits in `owed` until it is due itself. Gravity and walls, who owe nobody anything, act with the particle's own steps.
+    neighbours waits in `owed` until it is due itself. Gravity and walls, to which
+    nothing is owed, act with the particle's own steps.
     """
 
-    def __init__(self, particles, near, grid, momentum, *rest, walls=(), **options):
-        super().__init__(particles, near, grid, momentum, *rest, **options)
+    def __init__(self, particles, near, grid, momentum, integrator, medium, *, walls=(), **options):
+        super().__init__(particles, near, grid, momentum, integrator, medium, **options)
         if self.integrates_density or self.moving_walls or self.obstacles or particles.has_past or particles.has_guide:
             raise NotImplementedError(
                 "only summed density, walls at rest, no obstacles, no inflows, no asynchronous cells"
             )
         backend, capacity, dim = backends.current(), particles.capacity, particles.dim
         self.impulse_moves = SETTINGS["position"] == "impulse"
+        self.recalls = SETTINGS["recalls"]
         self.width = momentum.width
         self.owed = vector_field(dim, backend.dtype, capacity)
         """Velocity [m/s] that a particle has to get when it is due next: of pairs up to the middle of their present step."""
         self.end = ti.field(ti.i32, capacity)
         """Tick at which a particle is planned to be due next."""
-        particles.reals += components(self.owed)
+        self.own = vector_field(dim, backend.dtype, capacity)
+        """Acceleration [m/s^2] by walls and gravity at the last evaluation."""
+        particles.reals += components(self.owed) + components(self.own)
         particles.carry(self.end)
         self.is_due, self.last, self.until, self.planned = (ti.field(ti.i32, capacity) for _ in range(4))
         self.rates = vector_field(self.width, backend.dtype, capacity)
@@ -60,6 +66,26 @@ class ImpulseMotion(Motion):
         width = self.width
         of_pair = momentum.sum.pair
 
+        viscosities = [term for term in viscosity_terms(SETTINGS["scene"], medium, near) if term.along == "x"]
+        kernel, mass, tiny, regular = medium.kernel, medium.mass, medium.tiny, medium.regular
+
+        @ti.func
+        def push_at(i, j, time):
+            """Acceleration of the particle at place i due to that at j at tick `time`, when one of them was evaluated last."""
+            one, two = grid.order[i], grid.order[j]
+            dt_one, dt_two = self.elapsed(one, time, self.tick[None]), self.elapsed(two, time, self.tick[None])
+            x_one, x_two = self.position(one, dt_one, self.tick[None]), self.position(two, dt_two, self.tick[None])
+            x_ij = grid.geometry.difference(x_one, x_two)
+            v_ij = self.velocity(one, dt_one, self.tick[None]) - self.velocity(two, dt_two, self.tick[None])
+            rho_one = self.density(one, dt_one, self.tick[None])
+            rho_two = self.density(two, dt_two, self.tick[None])
+            pushed = -self.equation_of_state.pressure_of(one, rho_one) / (rho_one * rho_one)
+            pushed -= self.equation_of_state.pressure_of(two, rho_two) / (rho_two * rho_two)
+            d2 = x_ij.norm_sqr()
+            for term in ti.static(viscosities):
+                pushed += term.fluid_pair(near, i, j, x_ij, v_ij, d2) / ((rho_one + rho_two) * (d2 + regular))
+            return mass * pushed * kernel.gradient_factor(ti.sqrt(d2 + tiny)) * x_ij
+
         @ti.func
         def kick(i, j):
             """Rates of i due to j, then velocities [m/s] for the time behind and for the time ahead."""
@@ -68,13 +94,24 @@ class ImpulseMotion(Motion):
             for d in ti.static(range(width)):
                 total[d] = rates[d]
             if self.is_due[i] + self.is_due[j] > 0:
-                before = self.paid(ti.max(self.last[i], self.last[j]), ti.min(self.until[i], self.until[j]))
-                after = self.paid(self.now[None], ti.min(self.planned[i], self.planned[j]))
-                behind = (ti.cast(self.now[None], backend.dtype) - before) * self.tick[None]
-                ahead = (after - ti.cast(self.now[None], backend.dtype)) * self.tick[None]
+                now = self.now[None]
+                last, planned = ti.max(self.last[i], self.last[j]), ti.min(self.until[i], self.until[j])
+                middle = 0.5 * ti.cast(last + now, backend.dtype)
+                behind = (ti.cast(now, backend.dtype) - middle) * self.tick[None]
+                after = self.paid(now, ti.min(self.planned[i], self.planned[j]))
+                ahead = (after - ti.cast(now, backend.dtype)) * self.tick[None]
                 for d in ti.static(range(dim)):
                     total[width + d] = behind * rates[d]
                     total[width + dim + d] = ahead * rates[d]
+                if ti.max(last, planned) != now:  # it has been paid for another time than has passed
+                    more = (middle - self.paid(last, planned)) * self.tick[None]
+                    if ti.static(self.recalls):
+                        before = push_at(i, j, last)
+                        for d in ti.static(range(dim)):
+                            total[width + d] += more * before[d]
+                    else:
+                        for d in ti.static(range(dim)):
+                            total[width + d] += more * rates[d]
                 if rates[0] != 0.0:
                     total[width + 2 * dim] = 1.0
             return total
@@ -150,10 +187,10 @@ class ImpulseMotion(Motion):
                 a_new[d] = self.rates[k][d] + by_walls[d] + outer[d]
             if ti.static(self.particles.has_rho_rate):
                 self.particles.rho_rate[i] = self.rates[k][self.particles.dim] + by_walls[self.particles.dim]
-            paid = self.paid(self.last[k], self.until[k])
-            behind = (ti.cast(now, float) - paid) * tick
+            behind = 0.5 * dt
+            more = (0.5 * ti.cast(self.last[k] + now, float) - self.paid(self.last[k], self.until[k])) * tick
             ahead = (self.paid(now, self.planned[k]) - ti.cast(now, float)) * tick
-            v = self.particles.v[i] + self.owed[i] + self.closing[k] + behind * (a_walls + outer)
+            v = self.particles.v[i] + self.owed[i] + self.closing[k] + behind * (a_walls + outer) + more * self.own[i]
             x = self.integrator.correct_position(self.near.x[k], a, a_new, dt)
             if ti.static(self.impulse_moves):
                 x = self.near.x[k] + (v - self.particles.v[i] - a * dt) * (dt * (1.0 / 3.0))
@@ -174,13 +211,14 @@ class ImpulseMotion(Motion):
             self.particles.x[i], self.particles.v[i], self.particles.a[i] = inside, v, a_new
             self.particles.updated[i] = now
             self.end[i] = self.planned[k]
+            self.own[i] = a_walls + outer
             self.owed[i] = self.opening[k] + ahead * (a_walls + outer)
             if ti.static(TOLD):
                 due.evaluated(i, a_new, tick)
 
 
 @contextlib.contextmanager
-def pairwise_impulses(position="impulse", on=True):
+def pairwise_impulses(position="impulse", on=True, recalls=True):
     """Let simulations that are built inside have pairwise impulses."""
     if not on:
         yield
@@ -189,13 +227,14 @@ def pairwise_impulses(position="impulse", on=True):
     made = []
 
     def remember(*given):
+        SETTINGS["scene"] = given[0]
         made[:] = make_walls(*given)
         return list(made)
 
     def motion(*given, **options):
         return ImpulseMotion(*given, walls=made, **options)
 
-    SETTINGS["position"] = position
+    SETTINGS.update(position=position, recalls=recalls)
     simulation.make_walls, simulation.Motion = remember, motion
     try:
         yield

@@ -1,8 +1,9 @@
 """Do pairwise impulses at borders between levels pay? The figures of docs/pairwise_impulses.md.
 
-python studies/pairwise_impulses.py [dams|dams_3d|impact|dams_sound|impact_sound|pool|drop ...] [paper ...] takes about 10 minutes on 2 cores.
+python studies/pairwise_impulses.py [dams|dams_3d|impact|dams_sound|impact_sound|pool|drop ...] [default|paper|many ...]
+takes about 20 minutes on 2 cores.
 
-With names of steppers (default, paper, "6 levels at 0.1") only those. The variant is in impulse_motion.py. Every setting runs as it is and with it, with densities of the last evaluation ("stale") and
+The variant is in impulse_motion.py. Every setting runs as it is and with it, with densities of the last evaluation ("stale") and
 extrapolated ones, beside `Uniform` with a step of a quarter of the shortest base step. Everything is in double precision.
 """
 
@@ -43,7 +44,7 @@ def impact(sound_speed):
 
 STEPPERS = {
     "default": lambda **o: rts.Regional(**o),
-    "6 levels at 0.1": lambda **o: rts.Regional(courant=0.1, levels=6, steps="integers", **o),
+    "many": lambda **o: rts.Regional(courant=0.1, levels=6, steps="integers", **o),
     "paper": lambda **o: rts.Regional(preset="paper", **o),
 }
 """What is compared, as functions of lambda_f and the rest."""
@@ -172,8 +173,8 @@ def drop(_chosen):
     """Error and order of a smooth flow without walls, `oscillating_drop`: velocities at 0.3 s, as in convergence.py."""
     scene, courants = rts.load_scene("oscillating_drop", spacing=0.1), (0.4, 0.2, 0.1)
 
-    def end(stepper, impulses=False):
-        with pairwise_impulses(on=impulses):
+    def end(stepper, pairs="own"):
+        with pairwise_impulses(on=pairs != "own", recalls=pairs == "impulses"):
             sim = rts.Simulation(scene, stepper)
         sim.advance_to(0.3)
         return sim.velocities(), sim.statistics["particle_updates"] / sim.count
@@ -183,15 +184,14 @@ def drop(_chosen):
     show("density", "pairs", *(f"longest step {c:g}" for c in courants), "order", "updates at 0.4")
     show(*["---"] * 7)
     for density in ("stale", "extrapolated"):
-        for impulses in (False, True):
+        for pairs in ("own", "impulses", "impulses, the rest by the new force"):
             errors, work = [], []
             for c in courants:
                 options = {"alpha": c / 2, "lambda_f": c / 32, "inactive_density": density}
-                v, updates = end(rts.Regional(courant=c / 3, levels=3, **options), impulses)
+                v, updates = end(rts.Regional(courant=c / 3, levels=3, **options), pairs)
                 errors.append(np.linalg.norm(v - reference) / np.linalg.norm(reference))
                 work.append(updates)
             order = np.log(errors[0] / errors[-1]) / np.log(courants[0] / courants[-1])
-            pairs = "impulses" if impulses else "own"
             show(density, pairs, *(f"{error:.1e}" for error in errors), f"{order:.2f}", f"{work[0]:.0f}")
 
 
