@@ -52,7 +52,9 @@ class ImpulseMotion(Motion):
         """Tick at which a particle is planned to be due next."""
         self.own = vector_field(dim, backend.dtype, capacity)
         """Acceleration [m/s^2] by walls and gravity at the last evaluation."""
-        particles.reals += components(self.owed) + components(self.own)
+        self.last_density = ti.field(backend.dtype, capacity)
+        """Density [kg/m^3] at the last evaluation: at this point of a step `Particles.rho` is new already."""
+        particles.reals += [*components(self.owed), *components(self.own), self.last_density]
         particles.carry(self.end)
         self.is_due, self.last, self.until, self.planned = (ti.field(ti.i32, capacity) for _ in range(4))
         self.rates = vector_field(self.width, backend.dtype, capacity)
@@ -77,8 +79,10 @@ class ImpulseMotion(Motion):
             x_one, x_two = self.position(one, dt_one, self.tick[None]), self.position(two, dt_two, self.tick[None])
             x_ij = grid.geometry.difference(x_one, x_two)
             v_ij = self.velocity(one, dt_one, self.tick[None]) - self.velocity(two, dt_two, self.tick[None])
-            rho_one = self.density(one, dt_one, self.tick[None])
-            rho_two = self.density(two, dt_two, self.tick[None])
+            rho_one, rho_two = self.last_density[one], self.last_density[two]
+            if ti.static(particles.has_rho_rate):
+                rho_one += particles.rho_rate[one] * dt_one
+                rho_two += particles.rho_rate[two] * dt_two
             pushed = -self.equation_of_state.pressure_of(one, rho_one) / (rho_one * rho_one)
             pushed -= self.equation_of_state.pressure_of(two, rho_two) / (rho_two * rho_two)
             d2 = x_ij.norm_sqr()
@@ -212,6 +216,7 @@ class ImpulseMotion(Motion):
             self.particles.updated[i] = now
             self.end[i] = self.planned[k]
             self.own[i] = a_walls + outer
+            self.last_density[i] = self.particles.rho[i]
             self.owed[i] = self.opening[k] + ahead * (a_walls + outer)
             if ti.static(TOLD):
                 due.evaluated(i, a_new, tick)
