@@ -4,7 +4,7 @@ python studies/pairwise_impulses.py [dams|dams_3d|impact|dams_sound|impact_sound
 takes about 20 minutes on 2 cores.
 
 The variant is in impulse_motion.py. Every setting runs as it is and with it, with densities of the last evaluation ("stale") and
-extrapolated ones, beside `Uniform` with a step of a quarter of the shortest base step. Everything is in double precision.
+extrapolated ones, beside `Uniform` with a step of a quarter of the default base step. Everything is in double precision.
 """
 
 import sys
@@ -174,7 +174,8 @@ def drop(_chosen):
     scene, courants = rts.load_scene("oscillating_drop", spacing=0.1), (0.4, 0.2, 0.1)
 
     def end(stepper, pairs="own"):
-        with pairwise_impulses(on=pairs != "own", recalls=pairs == "impulses"):
+        position = "serna" if "Eq. 6" in pairs else "impulse"
+        with pairwise_impulses(position, on=pairs != "own", recalls="new force" not in pairs):
             sim = rts.Simulation(scene, stepper)
         sim.advance_to(0.3)
         return sim.velocities(), sim.statistics["particle_updates"] / sim.count
@@ -184,7 +185,7 @@ def drop(_chosen):
     show("density", "pairs", *(f"longest step {c:g}" for c in courants), "order", "updates at 0.4")
     show(*["---"] * 7)
     for density in ("stale", "extrapolated"):
-        for pairs in ("own", "impulses", "impulses, the rest by the new force"):
+        for pairs in ("own", "impulses", "impulses, x by Eq. 6", "impulses, taken back by the new force"):
             errors, work = [], []
             for c in courants:
                 options = {"alpha": c / 2, "lambda_f": c / 32, "inactive_density": density}
