@@ -269,9 +269,9 @@ def require(scene: Scene, steppers: Iterable[Any], backend: Backend, *, debug: b
     steppers = list(steppers)
     for stepper in steppers:
         require_clock(scene, stepper)
-    require_resolution(scene, backend.precision)
     require_addresses(scene, steppers, backend, debug=debug)
     require_memory(scene, steppers, backend, debug=debug, pictures=pictures)
+    require_resolution(scene, backend.precision)  # last: its remedy, double precision, takes more memory
 
 
 def text(count: float) -> str:

@@ -43,7 +43,7 @@ def never_starts(monkeypatch, made):
 
     monkeypatch.setattr(checkpoint, "Simulation", lambda *_args, **_options: made[1])
     monkeypatch.setattr(recorder, "Series", stop)
-    monkeypatch.setattr("taichi_rts.commands.main.rts.init", lambda *_args: made[1].backend)
+    monkeypatch.setattr("taichi_rts.commands.main.rts.init", lambda *_args, **_options: made[1].backend)
 
 
 @pytest.mark.usefixtures("never_starts")
