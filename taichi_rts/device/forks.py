@@ -35,7 +35,7 @@ FORKS = {
     each.module: each
     for each in (
         Fork("taichi", "taichi"),
-        # Its default, compile_tier="balanced", leaves out optimisations that loops over neighbours need: one trial was 30 times slower.
+        # Its default, compile_tier="balanced", leaves out optimisations: loops over neighbours took 30 times as long.
         Fork("taichi-forge", "taichi_rts[forge]", options={"compile_tier": "full"}),
         Fork("quadrants", "taichi_rts[quadrants]", banner="ENABLE_QUADRANTS_HEADER_PRINT"),
     )
