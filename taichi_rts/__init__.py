@@ -1,4 +1,7 @@
-"""Spatially varying time stepping for weakly compressible SPH, on Taichi. Importing starts nothing; call `init`."""
+"""Spatially varying time stepping for weakly compressible SPH, on Taichi. Importing starts nothing; call `init`.
+
+`ti` is the Taichi, or the fork of it, that is used: for own kernels.
+"""
 
 from taichi_rts.device.backend import init, ti  # first: it keeps Taichi from printing its banner
 
