@@ -9,6 +9,8 @@ import copy
 import dataclasses
 from typing import Any
 
+import numpy as np
+
 from taichi_rts.scene.fluids.particles import Particles
 from taichi_rts.scene.parts.velocities import Field
 from taichi_rts.scene.scene import Scene
@@ -30,6 +32,14 @@ def at_origin(scene: Scene) -> Scene:
     """Return `scene` with its coordinates counted from `origin_of` it; the same object where that is 0."""
     origin = origin_of(scene)
     return translated(scene, tuple(-x for x in origin)) if any(origin) else scene
+
+
+def placed(scene: Scene, x: np.ndarray) -> np.ndarray:
+    """Positions `x` [m], (..., dim), counted from `origin_of` it, as `scene` counts: in double precision unless that is 0."""
+    origin = origin_of(scene)
+    if not any(origin):
+        return x
+    return np.clip(x + np.asarray(origin), scene.domain.lower, scene.domain.upper)
 
 
 def translated(thing: Any, shift: Vector) -> Any:

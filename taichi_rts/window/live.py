@@ -15,6 +15,7 @@ from taichi_rts.rendering.painter import PictureOptions, make_camera
 from taichi_rts.scene.placing import at_origin
 from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
+from taichi_rts.solver.stepping.steppers import STEPPERS
 from taichi_rts.window.session import HISTORY, LiveSession
 from taichi_rts.window.window import LiveWindow
 
@@ -31,9 +32,7 @@ KEY_LINES = (
     "Space   pause, go on",
     ". or n  one base step",
     "r       back to the start",
-    "1 or u  uniform steps",
-    "2 or g  regional steps",
-    "3 or a  asynchronous steps",
+    *(f"{number} or {kind.key}  {name} steps" for number, (name, kind) in enumerate(STEPPERS.items(), 1)),
     "Return  apply the sliders",
     "c       next colours",
     "p       other palette",
@@ -109,7 +108,7 @@ class Panel:
             session.wanted = dataclasses.replace(wanted, levels=levels, courant=courant, viscosity=viscosity)
             if panel.button("apply (Return)"):
                 session.press("Return")
-            if panel.button(f"palette: {session.painter.options.palette}"):
+            if panel.button(f"palette: {session.options.palette}"):
                 session.press("p")
             panel.text("lower right: shares over time")
             for line in _wrapped(session.message):
@@ -133,7 +132,7 @@ def share_plot(session: LiveSession, columns: int, rows: int) -> tuple[np.ndarra
     shades = [np.tile(BACKGROUND, (len(corners[0]), 1))]
     classes = session.classes()
     doubling = session.sim.schedule.levels_double
-    tints = colours.level_colours([each.first for each in classes], session.painter.options.palette, doubling=doubling)
+    tints = colours.level_colours([each.first for each in classes], session.options.palette, doubling=doubling)
     shares = np.array([each for each in session.history if len(each) == len(classes)]).reshape(-1, len(classes))
     tops = np.cumsum(shares, axis=1)
     left = HISTORY - len(shares) + np.arange(len(shares))
