@@ -7,8 +7,8 @@ import numpy as np
 from taichi_rts.device.backend import Backend, ti
 from taichi_rts.sampling.walls import WallLayer
 from taichi_rts.scene.geometry.bodies import bodies
-from taichi_rts.scene.geometry.making import make_solid
 from taichi_rts.scene.geometry.periodic import nearest_image, periods
+from taichi_rts.scene.obstacles.making import make_solid
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.sums import make_wall_sum
 from taichi_rts.solver.motion.motion import Motion

@@ -13,8 +13,8 @@ from taichi_rts.device.backend import Backend, has_vulkan_hardware
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.errors import ResourceError
 from taichi_rts.scene.checks.size import finest_spacing, size_of
-from taichi_rts.scene.geometry.making import make_solid
-from taichi_rts.scene.geometry.solid import grid_nodes
+from taichi_rts.scene.obstacles.making import make_solid
+from taichi_rts.scene.obstacles.solid import grid_nodes
 from taichi_rts.scene.placing import origin_of, translated
 from taichi_rts.solver.grid import resorting
 from taichi_rts.solver.grid.windows import entries, room

@@ -22,7 +22,7 @@ from taichi_rts.errors import CheckpointError, Error
 from taichi_rts.files.archive import Archive, open_archive, write_archive
 from taichi_rts.scene.files.reading import moved_along, parts_with_files, places_beside, require_files_near
 from taichi_rts.scene.loading import scene_from
-from taichi_rts.scene.parts.obstacles import changed_mesh, file_digest
+from taichi_rts.scene.obstacles.mesh import changed_mesh, file_digest
 from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
 from taichi_rts.solver.stepping.steppers import stepper_data, stepper_from

@@ -6,7 +6,7 @@ import functools
 
 import numpy as np
 
-from taichi_rts.scene.geometry.solid import Solid
+from taichi_rts.scene.obstacles.solid import Solid
 
 FINE = {2: 24, 3: 6}
 """Points of the surface per spacing, from which the wall particles are chosen, by dimension."""
