@@ -6,9 +6,9 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
 from taichi_rts.assembly.run import Run
+from taichi_rts.device.backend import ti
 from taichi_rts.solver.physics.timetable import LAST
 
 

@@ -52,7 +52,7 @@ class Job:
     def demanded_density(self) -> float:
         """Density over rest that the scene demands: by its speeds and depth, or because the reference has it.
 
-        Single particles overshoot the jump of a shock however short the steps are (docs/stability.md).
+        Single particles overshoot the jump of a shock however short the steps are (docs/evidence/stability.md).
         """
         return math.inf if self.reference else max(demanded_density(scene_from(self.scene)), self.density)
 
