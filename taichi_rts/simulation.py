@@ -38,6 +38,7 @@ from taichi_rts.solver.particles.neighbourhood import Neighbourhood
 from taichi_rts.solver.particles.particles import Particles
 from taichi_rts.solver.physics.continuity import DensityDiffusion, MirroredPressure
 from taichi_rts.solver.physics.momentum import Gravity, MomentumEquation, Pressure
+from taichi_rts.solver.physics.own_forces import own_forces
 from taichi_rts.solver.physics.timetable import Ticking
 from taichi_rts.solver.physics.viscosity import viscosity_terms
 from taichi_rts.solver.sound.floating_reference import FloatingReference
@@ -57,19 +58,24 @@ class Simulation:
     Call `taichi_rts.init` first, in the same thread; it may run in any. Another `init` ends it: what is then asked of it raises
     `BackendError`. Building one compiles its kernels and evaluates the first forces. With `debug` the stepper
     checks at every step what is true by construction, and raises `AssertionError` where it is not; and the walls' impulse is
-    added up.
+    added up. `forces` are a user's own: body forces and pair forces (docs/extending.md); `energy` knows no potential of theirs.
 
     Attributes:
         scene: what is simulated, with "auto" decided.
+        forces: a user's own.
         local: the same with its coordinates counted from `origin`, as the device has them.
     """
 
     transient = frozenset({"_fluids", "taichi_start"})
 
-    def __init__(self, scene: Scene, stepper: Stepper | None = None, *, debug: bool = False) -> None:
+    def __init__(
+        self, scene: Scene, stepper: Stepper | None = None, *, forces: Sequence[Any] = (), debug: bool = False
+    ) -> None:
         backend = backends.current()
         self.taichi_start = backends.start_for_fields()
         self.stepper = stepper if stepper is not None else cast(Stepper, Regional())
+        own = own_forces(forces)
+        self.forces = tuple(forces)
         self.scene = scene.with_sound_for(self.stepper)
         self.backend = backend
         require(self.scene, [self.stepper], backend, debug=debug)
@@ -133,6 +139,8 @@ class Simulation:
             backend,
             with_rho_rate=self.particles.has_rho_rate,
             diffusion=DensityDiffusion(self.medium, scene) if density.integrates else None,
+            own=own,
+            origin=self.origin,
         )
         self.motion = Motion(
             self.particles,
@@ -485,14 +493,18 @@ class Simulation:
         """Whether `momentum_drift` can say anything."""
         scene = self.scene
         return self.particles.has_budget and not (
-            scene.body_force or scene.gravity_changes or scene.inflows or scene.outlets
+            scene.body_force
+            or scene.gravity_changes
+            or scene.inflows
+            or scene.outlets
+            or own_forces(self.forces).bodies
         )
 
     def momentum_drift(self) -> np.ndarray:
         """Momentum [kg m/s], (dim,), that no outer force accounts for: the change less gravity's and the walls' share.
 
         Zero to rounding with uniform steps, where partners push each other equally at the same time. Needs a debug run and a
-        scene without body force, changes of gravity, inflows and outlets, else raises `Error`.
+        scene without body forces, changes of gravity, inflows and outlets, else raises `Error`.
         """
         if not self.keeps_momentum_budget:
             raise Error(
