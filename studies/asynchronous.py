@@ -1,4 +1,4 @@
-"""Measures the asynchronous stepper beside the others and prints the tables of docs/asynchronous.md.
+"""Measures the asynchronous stepper beside the others and prints the tables of docs/evidence/asynchronous.md.
 
 python studies/asynchronous.py [checks|projectile|front|momentum|speed ...] takes about 25 minutes on 2 cores.
 """

@@ -1,6 +1,6 @@
-"""Tries all bad input of tests/reliability and prints the tables of docs/bad_input.md: python studies/bad_input.py.
+"""Tries all bad input of tests/reliability and writes what each is answered: python studies/bad_input.py [PAGE].
 
-Rows of checkpoints are only run by their test, which needs a run to spoil.
+The page is build/bad_input.md unless another is named. Rows of checkpoints are only run by their test: it needs a run to spoil.
 """
 
 import contextlib
@@ -21,6 +21,8 @@ from bad_scenes import SCENES
 from rows import RUN, prepare
 from scenes import to_toml
 from trial import PATIENCE, attempt, fill, without
+
+PAGE = Path(__file__).parents[1] / "build" / "bad_input.md"
 
 
 def fields(folder):
@@ -64,16 +66,14 @@ def commands(folder, rows):
     return len(rows), failed
 
 
-def main():
-    def never(*_args, **_options):
-        raise AssertionError("a run has begun")
-
-    recorder.Simulation = never
+def write_tables():
+    """Print all tables; returns whether any case failed."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "bad"
         folder.mkdir()
         fill(folder)
         counts = []
+        print("# Bad input\n\nWhat each mistake is answered (docs/evidence/reliability.md says what is promised).")
         for title, do in (
             ("Fields of a scene", lambda: fields(folder)),
             ("Scene files", lambda: commands(folder, SCENES)),
@@ -86,8 +86,20 @@ def main():
     for each in counts:
         row(*each)
     row("Checkpoints (tests/reliability/test_bad_checkpoints.py)", len(bad_checkpoints.ROWS) + 1, "")
-    raise SystemExit(any(failed for _title, _tried, failed in counts))
+    return any(failed for _title, _tried, failed in counts)
+
+
+def main(page):
+    def never(*_args, **_options):
+        raise AssertionError("a run has begun")
+
+    recorder.Simulation = never
+    page.parent.mkdir(parents=True, exist_ok=True)
+    with page.open("w", encoding="utf-8") as file, contextlib.redirect_stdout(file):
+        failed = write_tables()
+    print(f"{page}: {'some cases FAILED' if failed else 'all cases as promised'}")
+    raise SystemExit(failed)
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else PAGE)

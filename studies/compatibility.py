@@ -1,7 +1,7 @@
 """The built wheel with the oldest and the newest packages it allows: python studies/compatibility.py [--python 3.12].
 
-Needs uv (pip install uv) to choose the oldest. Prints a table (docs/reliability.md): each row is a new virtual environment, in
-which every module is imported and the demo is run.
+Needs uv (pip install uv) to choose the oldest. Prints a table (docs/evidence/reliability.md): each row is a new virtual
+environment, in which every module is imported and the demo is run.
 """
 
 import argparse
@@ -15,7 +15,7 @@ from tables import head, row
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "reliability"))
 import wheel
 
-CORE = ("taichi", "numpy", "imageio", "pillow", "pydantic", "tyro", "rich")
+CORE = ("taichi", "numpy", "scipy", "imageio", "pillow", "pydantic", "tyro", "rich")
 
 
 def attempt(built, python, resolution, extras):

@@ -1,4 +1,4 @@
-"""Error of every stepper against its step, on two drops with a free surface: prints the tables of docs/asynchronous.md.
+"""Error of every stepper against its step, on two drops with a free surface: prints the tables of docs/evidence/asynchronous.md.
 
 python studies/convergence.py [elliptical_drop|oscillating_drop ...] takes about 5 minutes on 2 cores.
 

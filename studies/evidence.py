@@ -1,4 +1,4 @@
-"""Measures what the defaults rest on and prints the tables of docs/defaults.md: python studies/evidence.py [part ...].
+"""Measures what the defaults rest on and prints the tables of docs/evidence/defaults.md: python studies/evidence.py [part ...].
 
 Parts: pool, pools, dam, walls, front. All of it takes about 20 minutes on 2 cores.
 """

@@ -1,5 +1,5 @@
 """Every combination of levels, steps, grading, limiter and sound speed of `Regional` in a small impact: the table of
-docs/stability.md.
+docs/evidence/stability.md.
 
 python studies/levels.py: each as a debug run, in which no particle may be late; about 40 minutes on 2 cores. What is
 done is kept in out/levels.json; a second call goes on from there.
@@ -15,7 +15,7 @@ from tables import head, row
 
 import taichi_rts as rts
 
-sys.path.append(str(Path(__file__).parents[1] / "conformance"))
+sys.path.append(str(Path(__file__).parents[1] / "tests" / "conformance"))
 from combinations import ALL, LEVELS, STEPS, drop_on_pool
 from combinations import run as run_scene
 

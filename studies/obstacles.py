@@ -1,4 +1,4 @@
-"""The tables of docs/obstacles.md: how evenly wall particles lie, and who gets into meshes in a dam break.
+"""The tables of docs/evidence/obstacles.md: how evenly wall particles lie, and which particles get into meshes in a dam break.
 
 python studies/obstacles.py [END_TIME [SPACING]]
 """

@@ -1,4 +1,4 @@
-"""What the regional sound speed saves, and what it costs in accuracy: the figures of docs/regional_sound_speed.md.
+"""What the regional sound speed saves, and what it costs in accuracy: the figures of docs/evidence/regional_sound_speed.md.
 
 python studies/regional_sound.py [speed|equal_error|extremes|rule|pool ...] [--particles 100k] [--scenes projectile,...]
 speed takes about 15 minutes on 2 idle cores at 100k particles, equal_error as long at 3k, the others a few minutes at their 6k.

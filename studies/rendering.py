@@ -1,4 +1,4 @@
-"""The table of docs/rendering.md: time and memory of pictures of many particles; nothing is simulated.
+"""The table of docs/evidence/speed.md: time and memory of pictures of many particles; nothing is simulated.
 
 python studies/rendering.py [PARTICLES [REPEATS [ARCH]]]
 """

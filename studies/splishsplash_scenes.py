@@ -1,4 +1,4 @@
-"""The table of docs/scene_files.md: which of SPlisHSPlasH's own scenes load and run, and how many particles they have.
+"""The table of docs/evidence/splishsplash.md: which of SPlisHSPlasH's own scenes load and run, and how many particles they have.
 
 pip install pysplishsplash==2.19.0; python studies/splishsplash_scenes.py [NAME ...]
 

@@ -1,4 +1,4 @@
-"""Runs the validation cases and prints the table of docs/validation.md: python studies/validation.py [case ...].
+"""Runs the validation cases and prints the table of docs/evidence/validation.md: python studies/validation.py [case ...].
 
 All of it takes about 12 minutes on 2 cores.
 """
@@ -8,9 +8,8 @@ import sys
 import time
 from pathlib import Path
 
-import taichi as ti
-
 import taichi_rts as rts
+from taichi_rts.device.backend import ti
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "validation"))
 from cases import CASES, run

@@ -1,4 +1,4 @@
-"""Does stepping in regions beat the best uniform step, scene by scene? Prints the table of docs/compare.md.
+"""Does stepping in regions beat the best uniform step, scene by scene? Prints the table of docs/evidence/verdicts.md.
 
 python studies/verdicts.py [scene ...] runs `taichi-rts compare --repeats 1` at its default size on every built-in scene:
 a few minutes a scene on 2 cores. Costs are particle updates, which do not depend on what else the machine does. What is done is

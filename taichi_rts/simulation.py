@@ -3,52 +3,41 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
-import math
 import time as clock
+import weakref
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, cast
 
 import numpy as np
-import taichi as ti
 from PIL import Image
 
-from taichi_rts.assembly.build import DENSITIES
+from taichi_rts.assembly import budget
+from taichi_rts.assembly.build import assemble
 from taichi_rts.assembly.frame_times import frame_times
-from taichi_rts.assembly.inventory import parts
 from taichi_rts.assembly.obstacle_forces import ForceMeter, ObstacleForces
 from taichi_rts.assembly.resources import require
-from taichi_rts.assembly.walls import make_keepers, make_walls
+from taichi_rts.assembly.snapshot import Snapshot
 from taichi_rts.assembly.work import Overhead, Tally
 from taichi_rts.device import backend as backends
+from taichi_rts.device.backend import ti
 from taichi_rts.device.ownership import guarded
 from taichi_rts.errors import Error, Interrupted, SimulationDivergedError, TimeError
-from taichi_rts.medium.energy import Energy, measure_energy
-from taichi_rts.medium.medium import Medium
+from taichi_rts.medium.energy import Energy
+from taichi_rts.readings.diagnosis import diagnose
+from taichi_rts.readings.reading import Moment, Reading
+from taichi_rts.rendering.painter import Painter, PictureOptions
 from taichi_rts.sampling.sampling import sample
-from taichi_rts.scene.placing import at_origin, origin_of
+from taichi_rts.scene.placing import at_origin, origin_of, placed
 from taichi_rts.scene.scene import Scene
-from taichi_rts.solver.grid.geometry import Geometry
-from taichi_rts.solver.grid.grid import BlockGrid
-from taichi_rts.solver.grid.windows import FluidWindows, WallWindows
-from taichi_rts.solver.motion.inflow import Inflows
-from taichi_rts.solver.motion.motion import Motion
-from taichi_rts.solver.motion.outlet import Outlets
-from taichi_rts.solver.particles.neighbourhood import Neighbourhood
-from taichi_rts.solver.particles.particles import Particles
-from taichi_rts.solver.physics.continuity import DensityDiffusion, MirroredPressure
-from taichi_rts.solver.physics.momentum import Gravity, MomentumEquation, Pressure
 from taichi_rts.solver.physics.own_forces import own_forces
-from taichi_rts.solver.physics.timetable import Ticking
-from taichi_rts.solver.physics.viscosity import viscosity_terms
-from taichi_rts.solver.sound.floating_reference import FloatingReference
-from taichi_rts.solver.sound.rule import SoundRule
 from taichi_rts.solver.stepping.base import Stepper
 from taichi_rts.solver.stepping.regional import Regional
 
-REORDER_EVERY = 32  # sorts between moving the state itself into the grid's order, for locality only
-
 OnFrame = Callable[["Simulation"], object]
+
+
+def _part(name: str) -> Any:
+    return property(lambda sim: getattr(sim.solver, name))
 
 
 @guarded("time", "count", "removed_count", "keeps_work", "keeps_momentum_budget")
@@ -66,102 +55,37 @@ class Simulation:
         local: the same with its coordinates counted from `origin`, as the device has them.
     """
 
-    transient = frozenset({"_fluids", "taichi_start"})
+    transient = frozenset({"_fluids", "taichi_start", "_latest"})
+    _latest: weakref.ref[Reading] | None = None
 
     def __init__(
-        self, scene: Scene, stepper: Stepper | None = None, *, forces: Sequence[Any] = (), debug: bool = False
+        self,
+        scene: Scene,
+        stepper: Stepper | None = None,
+        *,
+        forces: Sequence[Any] = (),
+        debug: bool = False,
+        started: bool = True,
     ) -> None:
-        backend = backends.current()
+        self.backend = backends.current()
         self.taichi_start = backends.start_for_fields()
         self.stepper = stepper if stepper is not None else cast(Stepper, Regional())
-        own = own_forces(forces)
+        own = own_forces(forces, origin_of(scene))
         self.forces = tuple(forces)
         self.scene = scene.with_sound_for(self.stepper)
-        self.backend = backend
-        require(self.scene, [self.stepper], backend, debug=debug)
-        self.local = scene = at_origin(self.scene)
-        start = sample(scene)
-        self.medium = Medium.of(scene, start.mass)
-        self.timeline = self.stepper.timeline(scene)
-
-        density = DENSITIES[scene.density]
-        wanted = {
-            "rho_rate": self.stepper.extrapolates_density,
-            "past": self.stepper.keeps_past,
-            "viscosity": len(set(scene.viscosities)) > 1,
-            "guided_until": bool(scene.inflows),
-            "sound": scene.regional_sound is not None,
-            "budget": debug,
-        }
-        needs = density.needs | {name for name, needed in wanted.items() if needed}
-        self.inflows = Inflows(scene, start.mass) if scene.inflows else None
-        capacity = len(start.positions) + (self.inflows.capacity if self.inflows else 0)
-        self.particles = Particles(
-            start.positions, start.velocities, start.densities, scene.rest_density, backend, needs, capacity
+        require(self.scene, [self.stepper], self.backend, debug=debug)
+        self.local = at_origin(self.scene)
+        sampled = sample(self.local)
+        self.solver = assemble(self.local, self.stepper, sampled, self.backend, own, debug=debug)
+        self._fluids, self._obstacle_layers, self.start_viscosities = (
+            sampled.fluids,
+            sampled.obstacles,
+            sampled.viscosities,
         )
-        self.start_viscosities = start.viscosities
-        if self.particles.has_viscosity:
-            unborn = capacity - len(start.positions)
-            self.particles.viscosity.from_numpy(np.pad(start.viscosities, (0, unborn)).astype(backend.numpy_dtype))
-        drift = self.stepper.drift * scene.support
-        geometry = Geometry(scene.domain.lower, scene.domain.upper, scene.support, drift, scene.is_periodic)
-        self.grid = BlockGrid(geometry, capacity, self.particles.alive)
-        self.sound = SoundRule(scene, self.particles, self.grid) if self.particles.has_sound else None
-        if self.sound:
-            law = FloatingReference(self.medium.equation_of_state, self.particles, self.sound)
-            self.medium = dataclasses.replace(self.medium, equation_of_state=law)
-        self.near = Neighbourhood(capacity, scene.dim, backend, needs, geometry)
-        self.particles.borrow(self.near.spare, self.grid.rank)
-        self.particles.carry(self.grid.cell_of)
-        self._obstacle_layers = start.obstacles
-        self._fluids = start.fluids
         self._meter: ForceMeter | None = None
-        self.walls = make_walls(scene, start, self.near, self.grid, backend)
-        windows = None
-        if backend.arch == "cpu":
-            per_block = math.prod(geometry.sides) / scene.spacing**scene.dim
-            windows = FluidWindows(self.near, self.grid, per_block, backend, needs)
-            for wall in self.walls:
-                if not wall.moves and not geometry.repeats:  # whose images would need places of their own
-                    wall.windows = WallWindows(wall)
-        self.density = density(self.particles, self.near, self.grid, windows, self.walls, self.medium, backend)
-        gravity = Gravity(scene)
-        pressure = MirroredPressure(self.near, scene) if density.integrates else Pressure(self.near)
-        momentum = MomentumEquation(
-            pressure,
-            viscosity_terms(scene, self.medium, self.near),
-            self.near,
-            self.grid,
-            windows,
-            self.walls,
-            self.medium,
-            gravity,
-            backend,
-            with_rho_rate=self.particles.has_rho_rate,
-            diffusion=DensityDiffusion(self.medium, scene) if density.integrates else None,
-            own=own,
-            origin=self.origin,
-        )
-        self.motion = Motion(
-            self.particles,
-            self.near,
-            self.grid,
-            momentum,
-            self.stepper.make_integrator(),
-            self.medium,
-            integrates_density=density.integrates,
-            obstacles=make_keepers(scene, geometry),
-        )
-        self.outlets = Outlets(scene, self.motion, start.mass) if scene.outlets else None
-        self.schedule = self.stepper.schedule(scene, self.particles, self.grid, self.timeline)
-        self.schedule.debug = debug
-        self.schedule.sound = self.sound
-
         self.overhead = Overhead(self.particles)
         self._tally = Tally(self.schedule.levels)
-        self._sorts = 0
         self._time = 0.0
-        self._count_in(self.timeline.tick)
         self.stop_asked: Callable[[], bool] = lambda: False
         """Asked after every step; once it is true `advance_to` raises `Interrupted`, and may be called again."""
         self._gravity_work = 0.0
@@ -169,57 +93,40 @@ class Simulation:
         began = clock.perf_counter()
         # So that the first step puts them in this order.
         self.motion.sort_particles(self.timeline.now, self.timeline.tick)
-        self._start()
+        if started:
+            self.start()
         self.setup_seconds = clock.perf_counter() - began
 
-    def _start(self) -> None:
-        self.step()  # lines 1-2: validity 0, so everybody is due now, where the first forces are evaluated
-        self.schedule.take_counts()
-        self.schedule.begin(
-            self.timeline, self.timeline.now
-        )  # as the line above: so that `wall_seconds` holds no compilation
-        ti.sync()
+    particles, near, grid, walls = (_part(name) for name in ("particles", "near", "grid", "walls"))
+    medium, density, motion, timeline = (_part(name) for name in ("medium", "density", "motion", "timeline"))
+    schedule, inflows, outlets, sound = (_part(name) for name in ("schedule", "inflows", "outlets", "sound"))
 
-    def _count_in(self, tick: float) -> None:
-        """Let all that the scene moves be counted in ticks of this length [s]."""
-        self._counted_in = tick
-        for part in parts(self, Ticking):
-            part.count_in(tick)
+    def start(self) -> None:
+        """Evaluate the first forces (lines 1-2: validity 0, so that all are due).
+
+        A new simulation has done so, unless it was made with `started=False`.
+        """
+        self.step()
+        self.schedule.take_counts()
+        self.schedule.begin(self.timeline, self.timeline.now)  # so that `wall_seconds` holds no compilation
+        ti.sync()
 
     def step(self) -> None:
         """Do what is due at the present tick: lines 4-29 of Algorithm 1."""
-        now, tick = self.timeline.now, self.timeline.tick
-        if tick != self._counted_in:  # another courant, on the same kernels
-            self._count_in(tick)
-        schedule = self.schedule
+        solver, schedule, motion = self.solver, self.solver.schedule, self.solver.motion
+        now, tick = solver.timeline.now, solver.timeline.tick
+        solver.count_in(tick)
         with self.overhead.shared:
             if schedule.needs_sorting:
-                self._sort(now, tick)  # line 4
-            if self.sound and schedule.needs_sound:
-                self.sound.update(schedule.read_at, now, tick)
+                solver.sort(now, tick, self._collect_counts)  # line 4
+            solver.find_sound(now, tick)
             schedule.select(now, tick)  # lines 5-16
-            self.motion.predict_neighbourhood(schedule.read_at, now, tick)  # lines 25-26, where somebody looks
+            motion.predict_neighbourhood(schedule.read_at, now, tick)  # lines 25-26, where a due particle reads
         with self.overhead.due:
-            if self.motion.moving_walls:
-                self.motion.observe_walls(schedule, now, tick)
-            self.density.update(schedule, now, tick)  # lines 18-21
-            self.motion.advance_due(schedule, now, tick)  # lines 22-29
+            solver.observe_walls(now, tick)
+            solver.density.update(schedule, now, tick)  # lines 18-21
+            motion.advance_due(schedule, now, tick)  # lines 22-29
         schedule.observe(now, tick)
-
-    def _sort(self, now: int, tick: float) -> None:
-        if self.inflows and self.inflows.waiting(now * tick):
-            self._collect_counts()
-            self.inflows.enter(self.particles, now, tick)
-        if self.outlets and (leaving := self.outlets.find(now, tick)):
-            self._collect_counts()
-            self.outlets.take_out(leaving, now, tick)
-        if self._sorts % REORDER_EVERY == 0:
-            self.particles.reorder(self.grid.order)
-            if self.grid.tracks_arrivals:
-                self.grid.arrived.fill(1)  # so that all blocks are looked at now and then
-        self._sorts += 1
-        self.motion.sort_particles(now, tick)
-        self.schedule.sorted(now, tick)
 
     def advance_to(self, time: float) -> None:
         """Run all steps up to physical `time` [s]; readers then predict to exactly that time.
@@ -250,7 +157,8 @@ class Simulation:
             if time > self._time or time == 0.0 == self._time:
                 with contextlib.suppress(SimulationDivergedError):  # `check` says more
                     self.advance_to(time)
-                self.check()
+                present = self.read()  # held until all have looked at it
+                _require_whole(present)
                 for look in looks:
                     look(self)
         return self
@@ -261,15 +169,10 @@ class Simulation:
         That is: a state is not finite, speeds or accelerations had to be limited, or a density is not between 0.02 and 2 of
         rest. It reads the state, so it is for once in a while; `advance_to` itself notices only what is not finite.
         """
-        from taichi_rts.readings.diagnosis import diagnose  # only here, as it reads simulations
-
-        if (found := diagnose(self)) is not None:
-            raise SimulationDivergedError(f"blown up: {found}")
+        _require_whole(self.read())
 
     def show(self, **options: Any) -> Image.Image:
         """Return a picture of the present state, which a notebook shows; `options` are those of `PictureOptions`."""
-        from taichi_rts.rendering.painter import Painter, PictureOptions  # only here: nothing else below needs pictures
-
         return Image.fromarray(Painter(self.scene, PictureOptions(**options)).paint(self))
 
     def __repr__(self) -> str:
@@ -284,7 +187,7 @@ class Simulation:
 
     def _potential(self, time: float) -> float:
         """Potential energy [J] that the present positions have in the gravity of `time` [s]."""
-        return measure_energy(self.local, self.medium, *self.local_state()[:3], time).potential
+        return self.read().potential_energy(time)
 
     def _advance(self, time: float) -> None:
         target = self.timeline.ticks_until(time)
@@ -326,7 +229,7 @@ class Simulation:
 
     def ids(self) -> np.ndarray:
         """Stable ids, (N,), of the particles that all readers speak of, ascending; an outlet takes some out for good."""
-        return self.particles.ids()
+        return self.read().ids.copy()
 
     @property
     def removed_count(self) -> int:
@@ -343,76 +246,89 @@ class Simulation:
         """Point [m], (dim,), from which the run counts its positions: 0 unless the domain lies far from it (`placing`)."""
         return origin_of(self.scene)
 
+    def read(self) -> Reading:
+        """Return the present state: one object for all that ask at one time, as long as any of them holds it."""
+        found = self._latest() if self._latest else None
+        if found is None or found.moment != Moment.of(self):
+            found = Reading.of(self, self._fluids, self._tally.particle_updates)
+            self._latest = weakref.ref(found)
+        return found
+
+    def restored(self) -> None:
+        """Take note that fields and values have been put back to what they were at another time."""
+        self.grid.restored()
+        self._latest = None
+
+    def snapshot(self) -> Snapshot:
+        """Return what any stepper needs to go on from the present time (`continue_from`)."""
+        now = self.read()
+        state = now.local_positions, now.velocities, now.densities
+        return Snapshot.of(self, state, now.ids, self._gravity_work)
+
+    def continue_from(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot of a run of the same scene, taken at a tick of this clock; statistics and budgets begin anew."""
+        snapshot.put_into(self)
+        self._time, self._gravity_work, self._latest = snapshot.time, snapshot.gravity_work, None
+        self.solver.sorts = 0
+        self._tally = Tally(self.schedule.levels, base_steps=self.schedule.steps)
+        self.start()
+
     def placed(self, x: np.ndarray) -> np.ndarray:
         """Positions `x` [m], (..., dim), counted from `origin`, as the scene counts: in double precision unless that is 0."""
-        if not any(self.origin):
-            return x
-        return np.clip(x + np.asarray(self.origin), self.scene.domain.lower, self.scene.domain.upper)
+        return placed(self.scene, x)
 
     def state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Positions [m] and velocities [m/s], (N, dim), densities [kg/m^3] and levels, (N,), at `time`, by particle id.
 
         Reals have the run's precision, positions in a domain far from 0 double precision.
         """
-        x, v, rho, level = self.local_state()
-        return self.placed(x), v, rho, level
+        now = self.read()
+        return now.positions.copy(), now.velocities.copy(), now.densities.copy(), now.levels.copy()
 
     def local_state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """As `state`, with positions [m], (N, dim), counted from `origin`: all reals have the run's precision."""
-        dtype, born = self.backend.numpy_dtype, self.particles.born
-        x, v = np.empty((born, self.scene.dim), dtype), np.empty((born, self.scene.dim), dtype)
-        rho, level = np.empty(born, dtype), np.empty(born, np.int32)
-        now, tick = self.timeline.now, self.timeline.tick
-        self.motion.export(now, tick, self._time - self.timeline.time, x, v, rho, level)
-        if self.count == born:
-            return x, v, rho, level
-        ids = self.ids()
-        return x[ids], v[ids], rho[ids], level[ids]
+        now = self.read()
+        return now.local_positions.copy(), now.velocities.copy(), now.densities.copy(), now.levels.copy()
 
     def positions(self) -> np.ndarray:
         """Positions [m], (N, dim), predicted to `time`, in order of particle id; far from 0 in double precision (`state`)."""
-        return self.state()[0]
+        return self.read().positions.copy()
 
     def velocities(self) -> np.ndarray:
         """Velocities [m/s], (N, dim), predicted to `time`, in order of particle id."""
-        return self.state()[1]
+        return self.read().velocities.copy()
 
     def densities(self) -> np.ndarray:
         """Densities [kg/m^3], (N,), by particle id: of each particle's last evaluation, with `Asynchronous` at `time`."""
-        return self.state()[2]
+        return self.read().densities.copy()
 
     def pressures(self) -> np.ndarray:
         """Pressures [Pa], (N,), by particle id, that belong to `densities`."""
-        return self.medium.equation_of_state.pressure_numpy(self.densities())
+        return self.read().pressures.copy()
 
     def sound_speeds(self) -> np.ndarray:
         """Sound speeds [m/s], (N,), at each particle's last evaluation, by particle id."""
-        if self.sound is None:
-            return np.full(self.count, self.medium.sound_speed)
-        return self.particles.to_numpy(self.particles.sound)
+        return self.read().sound_speeds.copy()
 
     def levels(self) -> np.ndarray:
         """Levels n, (N,): each particle's step is n base steps. In order of particle id."""
-        return self.state()[3]
+        return self.read().levels.copy()
 
     def fluids(self) -> np.ndarray:
         """Place of each particle's fluid in the scene, (N,), len(fluids) for what has flowed in. In order of particle id."""
-        unborn = self.particles.born - len(self._fluids)
-        return np.pad(self._fluids, (0, unborn), constant_values=len(self.scene.fluids))[self.ids()]
+        return self.read().fluids.copy()
 
     def steps(self) -> np.ndarray:
         """Steps [s], (N,): level times base step (`Uniform(adaptive=True)`: at most). In order of particle id."""
-        return self.particles.to_numpy(self.particles.level) * self.base_step
+        return self.read().steps.copy()
 
     def cell_times(self) -> np.ndarray:
         """Time [s] of each particle's last force evaluation, (N,), by particle id: asynchronous cells run ahead of `time`."""
-        return self.particles.to_numpy(self.particles.updated) * self.timeline.tick
+        return self.read().cell_times.copy()
 
     def leads(self) -> np.ndarray:
         """How far [s] the end of each particle's step lies ahead of the earliest end, (N,). In order of particle id."""
-        p = self.particles
-        ends = p.to_numpy(p.updated) + p.to_numpy(p.level) * self.schedule.base_ticks
-        return (ends - ends.min(initial=np.iinfo(ends.dtype).max)) * self.timeline.tick
+        return self.read().leads.copy()
 
     @property
     def statistics(self) -> dict[str, Any]:
@@ -435,45 +351,36 @@ class Simulation:
 
     def energy(self) -> Energy:
         """Kinetic, potential and internal energy [J] at `time`."""
-        return measure_energy(self.local, self.medium, *self.local_state()[:3], self._time)
+        return self.read().energy
+
+    def momentum(self) -> np.ndarray:
+        """Total momentum [kg m/s], (dim,), at `time`."""
+        return self.read().momentum.copy()
 
     @property
     def keeps_work(self) -> bool:
         """Whether `work` is known."""
-        return self.particles.has_budget or not (self.motion.moving_walls or self.inflows)
+        return budget.keeps_work(self)
 
     def work(self) -> float:
         """Energy [J] that changes of gravity, moving walls, moving obstacles and inflows have put in until `time`.
 
-        What flows in brings its kinetic and potential energy, what flows out takes its own along. Moving things and inflows
-        need a debug run, else raises `Error`.
+        Moving things and inflows need a debug run, else raises `Error` (`budget.work`).
         """
-        total = self._gravity_work
-        p = self.particles
-        if self.motion.moving_walls or self.inflows:
-            if not self.keeps_work:
-                raise Error("the work of moving walls, moving obstacles and inflows needs Simulation(..., debug=True)")
-            elapsed = self._time - p.to_numpy(p.updated) * self.timeline.tick
-            done = p.to_numpy(p.work).astype(float) + elapsed * p.to_numpy(p.power)
-            total += self.medium.mass * float(done.sum()) + (self.inflows.energy if self.inflows else 0.0)
-        if self.outlets:
-            total += self.outlets.work - self.outlets.energy
-        return total
+        return budget.work(self, self._gravity_work)
 
     def sound_work(self) -> float:
-        """Energy [J] that changes of the regional sound speed and of reference densities have put in; negative if taken out.
+        """Energy [J] that changes of the regional sound speed have put in (`budget.sound_work`); raises `Error` as `work`."""
+        return budget.sound_work(self)
 
-        A particle that becomes stiffer under the same pressure holds less energy. Needs a debug run, else raises `Error`.
-        """
-        if self.sound is None:
-            return 0.0
-        if not self.particles.has_budget:
-            raise Error("the work of changes of the sound speed needs Simulation(..., debug=True)")
-        return self.medium.mass * float(self.particles.to_numpy(self.particles.sound_work).astype(float).sum())
+    @property
+    def keeps_momentum_budget(self) -> bool:
+        """Whether `momentum_drift` can say anything."""
+        return budget.keeps_momentum_budget(self)
 
-    def momentum(self) -> np.ndarray:
-        """Total momentum [kg m/s], (dim,), at `time`."""
-        return self.medium.mass * self.velocities().astype(np.float64).sum(axis=0)
+    def momentum_drift(self) -> np.ndarray:
+        """Momentum [kg m/s], (dim,), that no outer force accounts for; raises `Error` as `budget.momentum_drift`."""
+        return budget.momentum_drift(self, self.momentum() - self._initial_momentum)
 
     def obstacle_forces(self) -> ObstacleForces:
         """Forces [N] and torques [N m] of the fluid on each obstacle, in the scene's order, at the last step up to `time`.
@@ -488,36 +395,7 @@ class Simulation:
         found = self._meter.measure(self.medium.mass, self.timeline.now, self.timeline.tick)
         return found._replace(pivots=found.pivots + np.asarray(self.origin))
 
-    @property
-    def keeps_momentum_budget(self) -> bool:
-        """Whether `momentum_drift` can say anything."""
-        scene = self.scene
-        return self.particles.has_budget and not (
-            scene.body_force
-            or scene.gravity_changes
-            or scene.inflows
-            or scene.outlets
-            or own_forces(self.forces).bodies
-        )
 
-    def momentum_drift(self) -> np.ndarray:
-        """Momentum [kg m/s], (dim,), that no outer force accounts for: the change less gravity's and the walls' share.
-
-        Zero to rounding with uniform steps, where partners push each other equally at the same time. Needs a debug run and a
-        scene without body forces, changes of gravity, inflows and outlets, else raises `Error`.
-        """
-        if not self.keeps_momentum_budget:
-            raise Error(
-                "the momentum budget needs Simulation(..., debug=True), "
-                "and a scene without body_force, gravity_changes, inflows and outlets"
-            )
-        p = self.particles
-        elapsed = self._time - p.updated.to_numpy() * self.timeline.tick
-        walls = p.wall_push.to_numpy().astype(float) + elapsed[:, None] * p.a_walls.to_numpy()
-        if p.has_past and (ahead := elapsed < 0.0).any():  # whose velocity is interpolated between two evaluations
-            step = (p.updated.to_numpy() - p.past_updated.to_numpy())[ahead] * self.timeline.tick
-            share = (-elapsed[ahead] / step)[:, None]
-            now, before = (field.to_numpy()[ahead].astype(float) for field in (p.wall_push, p.past_wall_push))
-            walls[ahead] = now + share * (before - now)
-        gravity = self.count * self._time * np.asarray(self.scene.acceleration)
-        return self.momentum() - self._initial_momentum - self.medium.mass * (walls.sum(axis=0) + gravity)
+def _require_whole(state: Reading) -> None:
+    if (found := diagnose(state)) is not None:
+        raise SimulationDivergedError(f"blown up: {found}")

@@ -46,7 +46,8 @@ Taichi puts all fields that are made between two launches of kernels into one bu
 SINGLE, DOUBLE = 2.0**-24, 2.0**-53
 """By which share of itself a number is rounded at most."""
 FINEST_POSITION = 0.001
-"""Share of the spacing by which positions may be rounded: a still pool then moves half as fast again (docs/reliability.md)."""
+"""Share of the spacing by which positions may be rounded: a still pool then moves half as fast again
+(docs/evidence/reliability.md)."""
 
 
 def device_bytes(

@@ -52,7 +52,7 @@ class Job:
     def demanded_density(self) -> float:
         """Density over rest that the scene demands: by its speeds and depth, or because the reference has it.
 
-        Single particles overshoot the jump of a shock however short the steps are (docs/stability.md).
+        Single particles overshoot the jump of a shock however short the steps are (docs/evidence/stability.md).
         """
         return math.inf if self.reference else max(demanded_density(scene_from(self.scene)), self.density)
 
@@ -123,10 +123,10 @@ class _Follower:
         if self.sim is None:
             self.sim = sim
             self.start = Rewind(sim) if self.job.repeats > 1 else None
-        x, v, rho, _ = sim.state()
+        now = sim.read()
         if len(self.record.times) % self.every == 0:
-            self.neighbours.append(mean_neighbours(x, sim.scene.support))
-        self.record.append(sim.time, x, v, rho, sim.pressures(), sim.energy())
+            self.neighbours.append(mean_neighbours(now.positions, now.scene.support))
+        self.record.append(now)
 
 
 def _work(sim: Any, statistics: dict[str, Any], neighbours: float) -> dict[str, Any]:

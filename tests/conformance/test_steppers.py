@@ -32,7 +32,7 @@ def runs(start_taichi, quick, on_demand, stepper):
 @every_problem
 def test_energy_is_never_gained(runs, stepper, name):
     energies = np.array(runs[name].energies)
-    # the paper's level 3 steps beyond the acoustic limit and simmers at rest: +1.1 % here (docs/defaults.md)
+    # the paper's level 3 steps beyond the acoustic limit and simmers at rest: +1.1 % here (docs/evidence/defaults.md)
     gain = 0.015 if (stepper, name) == ("regional_paper", "still_pool") else 0.01
     assert energies.max() <= (1.0 + gain) * energies[0]
     assert energies.min() > 0

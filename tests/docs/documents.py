@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("**/*.md"))]
 PROGRAMS = ("taichi-rts", "python", "python3", "make", "pip", "xvfb-run")
 FENCE = re.compile(r"^(?:> )?```(\w*)\n(.*?)^(?:> )?```$", re.MULTILINE | re.DOTALL)
 

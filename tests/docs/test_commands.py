@@ -98,6 +98,24 @@ def test_files_that_are_named_exist(page):
     assert not lost, page
 
 
+def test_pages_that_the_code_names_exist():
+    named = set()
+    for folder in ("taichi_rts", "tests", "studies", "demos"):
+        for path in [*(ROOT / folder).rglob("*.py"), *(ROOT / folder).rglob("*.toml")]:
+            named |= set(re.findall(r"\bdocs/[\w/]+\.md", path.read_text(encoding="utf-8")))
+    assert len(named) > 10
+    assert [page for page in sorted(named) if not (ROOT / page).exists()] == []
+
+
+def test_the_data_walk_enters_no_file_twice():
+    walk = documents.prose("docs/data_walk.md")
+    entered = [
+        file for step in re.findall(r"^\d+\. (.*?):", walk, re.MULTILINE) for file in re.findall(r"`([^`]+)`", step)
+    ]
+    assert len(entered) > 25
+    assert len(entered) == len(set(entered))
+
+
 @pytest.mark.parametrize("page", ALL)
 def test_scene_files_hold(page, folder, monkeypatch):
     monkeypatch.chdir(folder)

@@ -1,6 +1,6 @@
 """What runs of every scene gave when it was last found right, so that a change of the physics cannot go unseen.
 
-`invariants.json` holds it; `python studies/invariants.py --write` writes it anew (docs/reliability.md).
+`invariants.json` holds it; `python studies/invariants.py --write` writes it anew (docs/evidence/reliability.md).
 """
 
 import json

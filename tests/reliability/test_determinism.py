@@ -1,4 +1,4 @@
-"""The same bits whatever the threads do: state, levels, energy and statistics (docs/reliability.md)."""
+"""The same bits whatever the threads do: state, levels, energy and statistics (docs/evidence/reliability.md)."""
 
 import os
 import subprocess

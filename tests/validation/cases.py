@@ -1,7 +1,7 @@
 """The validation cases: a scene, when to look at it, and how far it is from an exact solution or an experiment.
 
 `tests/validation/test_cases.py` bounds the errors at a coarse size, `studies/validation.py` prints the table of
-docs/validation.md.
+docs/evidence/validation.md.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The validation cases at a coarse size (docs/validation.md has two sizes and all steppers).
+"""The validation cases at a coarse size (docs/evidence/validation.md has two sizes and all steppers).
 
 Each bound would catch a factor of 1.1 in what the comment beside it names; errors with a wrong factor come from runs with it.
 """

@@ -3,7 +3,7 @@
 On a GPU a thread has a particle and walks over the rows of cells around it. On a CPU a thread has a run of blocks along x. It
 gathers what lies in them and around them into a window: the nine rows of blocks (three in two dimensions) that surround the run,
 column of cells by column of cells, one array for each quantity. What lies near a particle is then one contiguous range, over
-which LLVM makes vector instructions with a single sum at the end (docs/speed.md has the figures).
+which LLVM makes vector instructions with a single sum at the end (docs/evidence/speed.md has the figures).
 """
 
 import math
@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
-from taichi_rts.device.backend import Backend, threads
+from taichi_rts.device.backend import Backend, threads, ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.solver.grid.geometry import MARGIN, Geometry
 from taichi_rts.solver.grid.grid import BlockGrid

@@ -3,8 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.medium.medium import Medium
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
@@ -70,7 +69,7 @@ class MirroredPressure(Pressure):
     -sum_b rho_0 V_b (p_i/rho_i^2 + max(0, p_i/rho_i^2 - g . x_ib / rho_0)) grad W_ib: Adami et al. 2012, Eq. 27, with the
     particle itself in place of the mean over the wall's neighbours, so that a wall needs no state. A summed density does not
     bear it (see `Pressure`); an integrated one, which the diffusion damps, does: a column of water rests under its hydrostatic
-    pressure to 1-2 %, where the one-sided force leaves 10 % (docs/validation.md).
+    pressure to 1-2 %, where the one-sided force leaves 10 % (docs/evidence/validation.md).
     """
 
     def __init__(self, near: Neighbourhood, scene: Scene) -> None:

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
-from taichi_rts.device.backend import Backend
+from taichi_rts.device.backend import Backend, ti
 from taichi_rts.medium.medium import Medium
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
@@ -85,8 +84,7 @@ class MomentumEquation:
     Pressure acts along x_ij; viscosity terms act along x_ij or v_ij, as their `along` says, and share the denominator
     (rho_i + rho_j) (|x_ij|^2 + 0.01 h^2), so that a pair costs one division. A term has two ti.funcs, `fluid_pair(near, i, j,
     x_ij, v_ij, d2)` and `wall_pair(i, b, x_ib, v_ib, d2, wall)`, which return its coefficient per unit of mass times gradient
-    factor (see `smoothing`), a viscosity's times that denominator. `own` are forces of a user's own (`own_forces`), which may ask
-    for positions: those here count from `origin` [m].
+    factor (see `smoothing`), a viscosity's times that denominator. `own` are forces of a user's own.
     """
 
     def __init__(
@@ -104,7 +102,6 @@ class MomentumEquation:
         with_rho_rate: bool = False,
         diffusion: Any = None,
         own: OwnForces | None = None,
-        origin: Sequence[float] = (),
     ) -> None:
         self.near = near
         self.gravity = gravity
@@ -112,7 +109,7 @@ class MomentumEquation:
         diffuses = diffusion is not None
         own = own or OwnForces()
         pairs = OwnPairs(own.pairs, medium)
-        self.own_bodies = OwnBodies(own.bodies, origin, grid.geometry)
+        self.own_bodies = OwnBodies(own, grid.geometry)
         self.width = width = dim + int(with_rho_rate) + int(diffuses)
         kernel, mass, rest_density = medium.kernel, medium.mass, medium.rest_density
         tiny, regular = medium.tiny, medium.regular

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
+from taichi_rts.device.backend import ti
 from taichi_rts.errors import Error
 from taichi_rts.medium.medium import Medium
 from taichi_rts.solver.grid.geometry import Geometry
@@ -33,21 +33,22 @@ SEE = "see docs/extending.md"
 
 @dataclass(frozen=True)
 class OwnForces:
-    """A user's forces by their kind."""
+    """A user's forces by their kind, and the point [m], (dim,), from which a run counts positions (`scene.placing`)."""
 
     pairs: tuple[Any, ...] = ()
     bodies: tuple[Any, ...] = ()
+    origin: tuple[float, ...] = ()
 
 
-def own_forces(forces: Sequence[Any]) -> OwnForces:
-    """Sort a user's `forces` by their kind; raises `Error` for what is no force."""
+def own_forces(forces: Sequence[Any], origin: Sequence[float] = ()) -> OwnForces:
+    """Sort a user's `forces` by their kind, for a run that counts from `origin`; raises `Error` for what is no force."""
     if not isinstance(forces, (list, tuple)):
         raise Error(f"forces is {forces!r}; give a list of forces, [...]")
     pairs: list[Any] = []
     bodies: list[Any] = []
     for number, force in enumerate(forces):
         (bodies if _is_body(force, f"forces[{number}]") else pairs).append(force)
-    return OwnForces(tuple(pairs), tuple(bodies))
+    return OwnForces(tuple(pairs), tuple(bodies), tuple(origin))
 
 
 def _is_body(force: Any, place: str) -> bool:
@@ -143,9 +144,9 @@ class OwnPairs:
 class OwnBodies:
     """The sum of all own body forces. They see positions as the scene counts them, while a run counts from `origin` [m]."""
 
-    def __init__(self, bodies: Sequence[Any], origin: Sequence[float], geometry: Geometry) -> None:
-        self.bodies = list(bodies)
-        self.origin = list(origin)
+    def __init__(self, own: OwnForces, geometry: Geometry) -> None:
+        self.bodies = list(own.bodies)
+        self.origin = list(own.origin)
         self.is_far = any(self.origin)
         self.geometry = geometry
 

@@ -1,7 +1,6 @@
 """Aligned blocks: steps end at multiples of themselves, so that blocks of one level are due together, and as a whole."""
 
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.particles.particles import Particles

@@ -1,7 +1,6 @@
 """Aligned blocks whose levels follow the regional sound speed (docs/regional_sound_speed.md)."""
 
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.aligned import AlignedBlocks
 from taichi_rts.solver.stepping.settled import SettledRegions

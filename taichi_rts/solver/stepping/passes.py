@@ -4,9 +4,9 @@ import math
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
 from taichi_rts.device import backend
+from taichi_rts.device.backend import ti
 from taichi_rts.device.counters import Counters
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid

@@ -6,9 +6,7 @@ What all schemes share. When a block or a particle is due is the schemes' own: `
 
 import math
 
-import taichi as ti
-
-from taichi_rts.device.backend import threads
+from taichi_rts.device.backend import threads, ti
 from taichi_rts.device.counters import Counters
 from taichi_rts.device.scan import ExclusiveScan
 from taichi_rts.scene.scene import Scene

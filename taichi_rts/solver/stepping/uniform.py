@@ -3,9 +3,9 @@
 import math
 from typing import Any, ClassVar, Literal
 
-import taichi as ti
 from pydantic.dataclasses import dataclass
 
+from taichi_rts.device.backend import ti
 from taichi_rts.errors import StepperError
 from taichi_rts.scene.scene import Scene
 from taichi_rts.scene.validation import FROZEN, Positive, validated

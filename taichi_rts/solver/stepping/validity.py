@@ -1,7 +1,6 @@
 """The paper's scheme: every particle has a validity of its own (Goswami & Batty 2014, Algorithm 1, lines 10-16)."""
 
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.particles.particles import Particles

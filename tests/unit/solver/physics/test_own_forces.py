@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-import taichi as ti
 
 import taichi_rts as rts
+from taichi_rts.device.backend import ti
 
 SCENE = rts.Scene(
     domain=rts.Box((0, 0), (0.6, 0.6)), fluids=[rts.Block((0, 0), (0.3, 0.4))], spacing=0.04, sound_speed=20.0

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-import taichi as ti
 
 import taichi_rts as rts
+from taichi_rts.device.backend import ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.scene.loading import scene_from
 from taichi_rts.solver.sound.rule import SLACK

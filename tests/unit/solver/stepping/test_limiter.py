@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
-import taichi as ti
 
 import taichi_rts as rts
 from taichi_rts.device import backend
+from taichi_rts.device.backend import ti
 from taichi_rts.solver.grid.geometry import Geometry
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.grid.surroundings import Surroundings

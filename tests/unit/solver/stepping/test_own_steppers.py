@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import pytest
-import taichi as ti
 
 import taichi_rts as rts
 from taichi_rts.compare import sweeps
 from taichi_rts.compare.variants import make_variants
+from taichi_rts.device.backend import ti
 from taichi_rts.solver.stepping import steppers
 from taichi_rts.solver.stepping.timeline import Timeline
 from taichi_rts.solver.stepping.uniform import UniformSchedule
