@@ -69,7 +69,7 @@ def test_with_the_same_steps_it_has_the_bits_of_uniform(simulate):
     assert sim.statistics["active_fraction"] == 1.0
 
 
-def test_a_checkpoint_goes_on_with_the_same_bits(simulate, registered, monkeypatch, tmp_path):
+def test_a_checkpoint_goes_on_with_the_same_bits(simulate, registered, tmp_path):
     path = tmp_path / "own.npz"
     sim = simulate(SCENE, Gentle(gentle=40))
     sim.advance_to(0.01)
@@ -88,7 +88,6 @@ def test_a_checkpoint_goes_on_with_the_same_bits(simulate, registered, monkeypat
         match=r"own.npz: stepper 'gentle' is none of uniform, regional, asynchronous; .*load_checkpoint\(..., steppers",
     ):
         rts.load_checkpoint(path)
-    monkeypatch.setattr(rts.Simulation, "_start", lambda sim: None)
     rts.init("cpu", "f64", restart=True)
     assert rts.load_checkpoint(path, steppers=[Gentle]).schedule.steps == steps
 
