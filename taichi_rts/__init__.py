@@ -45,7 +45,9 @@ from taichi_rts.scene.parts.view import View
 from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
 from taichi_rts.solver.stepping.asynchronous import Asynchronous
+from taichi_rts.solver.stepping.base import Stepper
 from taichi_rts.solver.stepping.regional import Regional
+from taichi_rts.solver.stepping.steppers import register_stepper
 from taichi_rts.solver.stepping.uniform import Uniform
 
 __version__ = "0.1.0"
@@ -86,6 +88,7 @@ __all__ = [
     "Sphere",
     "SphereObstacle",
     "StandingWave",
+    "Stepper",
     "StepperError",
     "TaylorGreen",
     "TimeError",
@@ -96,6 +99,7 @@ __all__ = [
     "load_checkpoint",
     "load_scene",
     "read_particles",
+    "register_stepper",
     "save_checkpoint",
     "scene_names",
     "scene_schema",

@@ -83,8 +83,10 @@ def join(path: str, name: str) -> str:
 
 
 def is_part(thing: Any) -> bool:
-    """Whether `thing` is an object of this package."""
-    return type(thing).__module__.split(".")[0] == PACKAGE and hasattr(thing, "__dict__")
+    """Whether `thing` is an object of this package, of a class derived from one of its, or of a user's class with ti.funcs."""
+    kind = type(thing)
+    ours = getattr(kind, "_data_oriented", False) or any(c.__module__.split(".")[0] == PACKAGE for c in kind.__mro__)
+    return ours and hasattr(thing, "__dict__")
 
 
 def is_frozen(thing: Any) -> bool:
