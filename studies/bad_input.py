@@ -1,6 +1,7 @@
 """Tries all bad input of tests/reliability and writes what each is answered: python studies/bad_input.py [PAGE].
 
-The page is build/bad_input.md unless another is named. Rows of checkpoints are only run by their test, which needs a run to spoil.
+The page is build/bad_input.md unless another is named. Rows of checkpoints are only run by their test, which needs a
+run to spoil.
 """
 
 import contextlib
@@ -23,6 +24,7 @@ from scenes import to_toml
 from trial import PATIENCE, attempt, fill, without
 
 PAGE = Path(__file__).parents[1] / "build" / "bad_input.md"
+
 
 def fields(folder):
     """Print a row for each field; returns how many cases were tried and how many of them failed."""

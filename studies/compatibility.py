@@ -1,7 +1,7 @@
 """The built wheel with the oldest and the newest packages it allows: python studies/compatibility.py [--python 3.12].
 
-Needs uv (pip install uv) to choose the oldest. Prints a table (docs/evidence/reliability.md): each row is a new virtual environment, in
-which every module is imported and the demo is run.
+Needs uv (pip install uv) to choose the oldest. Prints a table (docs/evidence/reliability.md): each row is a new virtual
+environment, in which every module is imported and the demo is run.
 """
 
 import argparse

@@ -1,8 +1,8 @@
 """Runs of 200,000 base steps: python studies/long_runs.py [--steps 200000] [--only pool] [--output out/long_runs.json].
 
 A pool at rest, and a tank that is tilted to and fro, with each stepper: is energy bounded, are mass, momentum and ticks kept, is
-memory flat? Prints a table (docs/evidence/reliability.md). Each row is a process of its own and is written as soon as it is done; a
-second call goes on with those that are missing.
+memory flat? Prints a table (docs/evidence/reliability.md). Each row is a process of its own and is written as soon as it is
+done; a second call goes on with those that are missing.
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """What a simulation remembers: every field and every plain value it is made of, found by walking through its parts.
 
-Nobody keeps a list: what a part has is kept, unless its class says under `transient` that it holds nothing between two steps, or
-nothing that the scene and the stepper do not give again. What someone forgets to say costs a few bytes, not the bits of a run.
+No list is kept by hand: every attribute of a part is saved, unless its class names it in `transient`, because it holds nothing
+between two steps or follows from the scene and the stepper. An entry forgotten there costs a few bytes, not the bits of a run.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Forces and torques of the fluid on obstacles, worked out only when somebody asks."""
+"""Forces and torques of the fluid on obstacles, computed only when asked for."""
 
 from typing import Any, NamedTuple
 
@@ -58,7 +58,9 @@ class ForceMeter:
         particles, dim = self.motion.particles, self.scene.dim
         self.motion.predict_neighbourhood(self.everywhere, now, tick)
         self.observe(now, tick)
-        rates = np.zeros((len(self.sums), particles.born, dim), self.dtype)  # zeros of who has gone add nothing
+        rates = np.zeros(
+            (len(self.sums), particles.born, dim), self.dtype
+        )  # zeros of particles that have left add nothing
         places = np.zeros((particles.born, dim), self.dtype)
         self.collect(rates, places)
         push = -mass * rates.astype(np.float64)

@@ -48,7 +48,8 @@ Taichi puts all fields that are made between two launches of kernels into one bu
 SINGLE, DOUBLE = 2.0**-24, 2.0**-53
 """By which share of itself a number is rounded at most."""
 FINEST_POSITION = 0.001
-"""Share of the spacing by which positions may be rounded: a still pool then moves half as fast again (docs/evidence/reliability.md)."""
+"""Share of the spacing by which positions may be rounded: a still pool then moves half as fast again
+(docs/evidence/reliability.md)."""
 
 
 def device_bytes(
@@ -139,7 +140,7 @@ def _lining(scene: Scene, spacing: float | None) -> float:
 
 
 def free_host_memory() -> float:
-    """Bytes that this process may still take: what the system has available, or less in a container; infinite if nobody says."""
+    """Bytes that this process may still take: what the system has available, or less in a container; infinite if unknown."""
     found = [math.inf]
     with contextlib.suppress(OSError, ValueError):
         facts = dict(line.split(":") for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines())

@@ -20,7 +20,7 @@ class Tally:
     levels: int
     base_steps: int = 0
     possible: int = 0
-    """Updates if everybody had been updated in every base step."""
+    """Updates if every particle had been updated in every base step."""
     wall_seconds: float = 0.0
     particle_steps: list[int] = field(default_factory=list)
     updates: list[int] = field(default_factory=list)
@@ -30,13 +30,13 @@ class Tally:
         self.updates = [0] * self.levels
 
     def add(self, steps: int, count: int, particle_steps: Sequence[int], updates: Sequence[int]) -> None:
-        """Add `steps` steps of `count` particles with their counts per level; empty ones stand for everybody at level 1."""
+        """Add `steps` steps of `count` particles with their counts per level; empty ones mean all particles at level 1."""
         self.base_steps += steps
         self.possible += steps * count
-        everybody = [steps * count]
-        for k, n in enumerate(particle_steps or everybody):
+        all_at_first = [steps * count]
+        for k, n in enumerate(particle_steps or all_at_first):
             self.particle_steps[k] += n
-        for k, n in enumerate(updates or everybody):
+        for k, n in enumerate(updates or all_at_first):
             self.updates[k] += n
 
     def statistics(self) -> dict[str, Any]:
@@ -73,7 +73,7 @@ class Stopwatch:
 
 
 class Overhead:
-    """Measures what everybody pays in a step against what the due particles pay, on every `EVERY`-th step.
+    """Measures the work for all particles in a step against that for the due particles, on every `EVERY`-th step.
 
     Waiting for the device costs a GPU a little, so only a sample is timed.
     """

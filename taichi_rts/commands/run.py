@@ -128,7 +128,7 @@ class Run:
     strict: bool = False
     """Exit with 3 if a run has blown up or was not weakly compressible: what the table marks red."""
     debug: bool = False
-    """Check at run time what steppers promise (nobody is extrapolated, somebody steps in every pass); adds up momentum."""
+    """Check at run time what steppers promise (nothing is extrapolated, some particle steps in every pass); adds up momentum."""
     gui: bool = False
     """Watch in a window instead of saving frames (needs Vulkan and a display)."""
 

@@ -77,7 +77,7 @@ def speedups(
     if bound is not None and run["family"] == "asynchronous":
         bound /= run["stepper"]["levels"]  # the solver's bound is over steps of one tick
     if changes_by(run["family"]):
-        bound = None  # its base step is that of a sound speed which hardly anybody has
+        bound = None  # its base step is that of a sound speed which hardly any particle has
     return {
         "equal_step": over(run["equal_step"]),
         "largest_stable": over(stable["stable"]),

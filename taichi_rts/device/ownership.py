@@ -71,7 +71,7 @@ def require_own_process() -> None:
 
 
 def holds_fields() -> bool:
-    """Whether anything would be lost if Taichi were started again: fields or arrays, of whoever made them."""
+    """Whether anything would be lost if Taichi were started again: fields or arrays, ours or the user's."""
     runtime = impl.get_runtime()
     if runtime.prog is None:
         return False

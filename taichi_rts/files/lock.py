@@ -24,7 +24,7 @@ NAME = ".lock"
 class FolderLock:
     """Holds a folder for this process, from its making until `release`; the folder is made if need be.
 
-    The system holds the lock (`flock`) and lets go of it when the process ends in whatever way; the file also says who it is, for
+    The system holds the lock (`flock`) and releases it when the process ends in any way; the file also names the process, for
     messages, and for folders that hosts share. A lock that a dead process of this host left behind is taken over, with a
     warning. Raises `OutputError` if another run has the folder.
     """
@@ -73,7 +73,7 @@ class FolderLock:
                         f"{self.folder} is being written to by process {holder.get('pid')} on {holder.get('host')}; "
                         f"choose another --output-dir, or, if that run is dead, delete {self.path}"
                     )
-                with contextlib.suppress(OSError):  # it may have been deleted by who had it, before this one was locked
+                with contextlib.suppress(OSError):  # its holder may have deleted it before this one was locked
                     if os.path.samestat(os.fstat(self.file), os.stat(self.path)):
                         break
                 self._close()
@@ -95,7 +95,7 @@ class FolderLock:
         return {}
 
     def _free(self, holder: dict[str, Any]) -> bool:
-        """Lock the file if nobody else has; what another host wrote is believed."""
+        """Lock the file if no other process has; an entry of another host is believed."""
         if holder and holder.get("host") != platform.node():
             return False
         if fcntl is None:

@@ -109,7 +109,9 @@ def test_pages_that_the_code_names_exist():
 
 def test_the_data_walk_enters_no_file_twice():
     walk = documents.prose("docs/data_walk.md")
-    entered = [file for step in re.findall(r"^\d+\. (.*?):", walk, re.MULTILINE) for file in re.findall(r"`([^`]+)`", step)]
+    entered = [
+        file for step in re.findall(r"^\d+\. (.*?):", walk, re.MULTILINE) for file in re.findall(r"`([^`]+)`", step)
+    ]
     assert len(entered) > 25
     assert len(entered) == len(set(entered))
 

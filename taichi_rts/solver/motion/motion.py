@@ -25,7 +25,7 @@ They bound the damage once a run has blown up: unlimited, particles pile up in a
 class Motion:
     """Prediction and correction with one integrator. `now` is a tick, `tick` its length [s].
 
-    `read_at[block]` says when a block's particles are read, in ticks after `now`, and is negative where nobody reads them.
+    `read_at[block]` says when a block's particles are read, in ticks after `now`, and is negative where they are not read.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class Motion:
         """Position [m] of particle `i`, `dt` [s] after its last evaluation, kept inside the domain.
 
         Within its step that is the prediction; before it (dt < 0) the cubic through the positions and velocities of its
-        last two evaluations (Hermite), so a reader who lives in the past interpolates as well.
+        last two evaluations (Hermite), so that reading at an earlier time interpolates as well.
         """
         p = self.particles
         x = self.integrator.predict_position(p.x[i], p.v[i], p.a[i], dt)
