@@ -15,7 +15,7 @@ from tables import head, row
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "reliability"))
 import wheel
 
-CORE = ("taichi", "numpy", "imageio", "pillow", "pydantic", "tyro", "rich")
+CORE = ("taichi", "numpy", "scipy", "imageio", "pillow", "pydantic", "tyro", "rich")
 
 
 def attempt(built, python, resolution, extras):

@@ -15,7 +15,7 @@ from tables import head, row
 
 import taichi_rts as rts
 
-sys.path.append(str(Path(__file__).parents[1] / "conformance"))
+sys.path.append(str(Path(__file__).parents[1] / "tests" / "conformance"))
 from combinations import ALL, LEVELS, STEPS, drop_on_pool
 from combinations import run as run_scene
 

@@ -8,9 +8,8 @@ import sys
 import time
 from pathlib import Path
 
-import taichi as ti
-
 import taichi_rts as rts
+from taichi_rts.device.backend import ti
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "validation"))
 from cases import CASES, run

@@ -4,11 +4,11 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import taichi as ti
 
 import taichi_rts as rts
+from taichi_rts.device.backend import ti
 
-sys.path.append(str(Path(__file__).parents[1] / "validation"))
+sys.path.append(str(Path(__file__).parents[1] / "tests" / "validation"))
 from test_wide_supports import CALM, DEPTH, SPACING, rest
 
 POOLS = [

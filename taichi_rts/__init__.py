@@ -1,6 +1,6 @@
 """Spatially varying time stepping for weakly compressible SPH, on Taichi. Importing starts nothing; call `init`."""
 
-from taichi_rts.device.backend import init  # first: it keeps Taichi from printing its banner
+from taichi_rts.device.backend import init, ti  # first: it keeps Taichi from printing its banner
 
 # isort: split
 from taichi_rts import importing  # noqa: F401  first, as Ctrl-C may come while the others are imported
@@ -97,5 +97,6 @@ __all__ = [
     "save_checkpoint",
     "scene_names",
     "scene_schema",
+    "ti",
     "write_particles",
 ]

@@ -3,51 +3,34 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
-import math
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, cast
 
 import numpy as np
-import taichi as ti
 from PIL import Image
 
-from taichi_rts.assembly.build import DENSITIES
+from taichi_rts.assembly.build import assemble
 from taichi_rts.assembly.frame_times import frame_times
-from taichi_rts.assembly.inventory import parts
 from taichi_rts.assembly.obstacle_forces import ForceMeter, ObstacleForces
 from taichi_rts.assembly.resources import require
-from taichi_rts.assembly.walls import make_keepers, make_walls
 from taichi_rts.assembly.work import Overhead, Tally
 from taichi_rts.device import backend as backends
+from taichi_rts.device.backend import ti
 from taichi_rts.device.ownership import guarded
 from taichi_rts.errors import Error, Interrupted, SimulationDivergedError, TimeError
 from taichi_rts.medium.energy import Energy, measure_energy
-from taichi_rts.medium.medium import Medium
 from taichi_rts.sampling.sampling import sample
 from taichi_rts.scene.placing import at_origin, origin_of
 from taichi_rts.scene.scene import Scene
-from taichi_rts.solver.grid.geometry import Geometry
-from taichi_rts.solver.grid.grid import BlockGrid
-from taichi_rts.solver.grid.windows import FluidWindows, WallWindows
-from taichi_rts.solver.motion.inflow import Inflows
-from taichi_rts.solver.motion.motion import Motion
-from taichi_rts.solver.motion.outlet import Outlets
-from taichi_rts.solver.particles.neighbourhood import Neighbourhood
-from taichi_rts.solver.particles.particles import Particles
-from taichi_rts.solver.physics.continuity import DensityDiffusion, MirroredPressure
-from taichi_rts.solver.physics.momentum import Gravity, MomentumEquation, Pressure
-from taichi_rts.solver.physics.timetable import Ticking
-from taichi_rts.solver.physics.viscosity import viscosity_terms
-from taichi_rts.solver.sound.floating_reference import FloatingReference
-from taichi_rts.solver.sound.rule import SoundRule
 from taichi_rts.solver.stepping.base import Stepper
 from taichi_rts.solver.stepping.regional import Regional
 
-REORDER_EVERY = 32  # sorts between moving the state itself into the grid's order, for locality only
-
 OnFrame = Callable[["Simulation"], object]
+
+
+def _part(name: str) -> Any:
+    return property(lambda sim: getattr(sim.solver, name))
 
 
 @guarded("time", "count", "removed_count", "keeps_work", "keeps_momentum_budget")
@@ -66,94 +49,26 @@ class Simulation:
 
     transient = frozenset({"_fluids", "taichi_start"})
 
-    def __init__(self, scene: Scene, stepper: Stepper | None = None, *, debug: bool = False) -> None:
-        backend = backends.current()
+    def __init__(
+        self, scene: Scene, stepper: Stepper | None = None, *, debug: bool = False, started: bool = True
+    ) -> None:
+        self.backend = backends.current()
         self.taichi_start = backends.start_for_fields()
         self.stepper = stepper if stepper is not None else cast(Stepper, Regional())
         self.scene = scene.with_sound_for(self.stepper)
-        self.backend = backend
-        require(self.scene, [self.stepper], backend, debug=debug)
-        self.local = scene = at_origin(self.scene)
-        start = sample(scene)
-        self.medium = Medium.of(scene, start.mass)
-        self.timeline = self.stepper.timeline(scene)
-
-        density = DENSITIES[scene.density]
-        wanted = {
-            "rho_rate": self.stepper.extrapolates_density,
-            "past": self.stepper.keeps_past,
-            "viscosity": len(set(scene.viscosities)) > 1,
-            "guided_until": bool(scene.inflows),
-            "sound": scene.regional_sound is not None,
-            "budget": debug,
-        }
-        needs = density.needs | {name for name, needed in wanted.items() if needed}
-        self.inflows = Inflows(scene, start.mass) if scene.inflows else None
-        capacity = len(start.positions) + (self.inflows.capacity if self.inflows else 0)
-        self.particles = Particles(
-            start.positions, start.velocities, start.densities, scene.rest_density, backend, needs, capacity
+        require(self.scene, [self.stepper], self.backend, debug=debug)
+        self.local = at_origin(self.scene)
+        sampled = sample(self.local)
+        self.solver = assemble(self.local, self.stepper, sampled, self.backend, debug=debug)
+        self._fluids, self._obstacle_layers, self.start_viscosities = (
+            sampled.fluids,
+            sampled.obstacles,
+            sampled.viscosities,
         )
-        self.start_viscosities = start.viscosities
-        if self.particles.has_viscosity:
-            unborn = capacity - len(start.positions)
-            self.particles.viscosity.from_numpy(np.pad(start.viscosities, (0, unborn)).astype(backend.numpy_dtype))
-        drift = self.stepper.drift * scene.support
-        geometry = Geometry(scene.domain.lower, scene.domain.upper, scene.support, drift, scene.is_periodic)
-        self.grid = BlockGrid(geometry, capacity, self.particles.alive)
-        self.sound = SoundRule(scene, self.particles, self.grid) if self.particles.has_sound else None
-        if self.sound:
-            law = FloatingReference(self.medium.equation_of_state, self.particles, self.sound)
-            self.medium = dataclasses.replace(self.medium, equation_of_state=law)
-        self.near = Neighbourhood(capacity, scene.dim, backend, needs, geometry)
-        self.particles.borrow(self.near.spare, self.grid.rank)
-        self.particles.carry(self.grid.cell_of)
-        self._obstacle_layers = start.obstacles
-        self._fluids = start.fluids
         self._meter: ForceMeter | None = None
-        self.walls = make_walls(scene, start, self.near, self.grid, backend)
-        windows = None
-        if backend.arch == "cpu":
-            per_block = math.prod(geometry.sides) / scene.spacing**scene.dim
-            windows = FluidWindows(self.near, self.grid, per_block, backend, needs)
-            for wall in self.walls:
-                if not wall.moves and not geometry.repeats:  # whose images would need places of their own
-                    wall.windows = WallWindows(wall)
-        self.density = density(self.particles, self.near, self.grid, windows, self.walls, self.medium, backend)
-        gravity = Gravity(scene)
-        pressure = MirroredPressure(self.near, scene) if density.integrates else Pressure(self.near)
-        momentum = MomentumEquation(
-            pressure,
-            viscosity_terms(scene, self.medium, self.near),
-            self.near,
-            self.grid,
-            windows,
-            self.walls,
-            self.medium,
-            gravity,
-            backend,
-            with_rho_rate=self.particles.has_rho_rate,
-            diffusion=DensityDiffusion(self.medium, scene) if density.integrates else None,
-        )
-        self.motion = Motion(
-            self.particles,
-            self.near,
-            self.grid,
-            momentum,
-            self.stepper.make_integrator(),
-            self.medium,
-            integrates_density=density.integrates,
-            obstacles=make_keepers(scene, geometry),
-        )
-        self.outlets = Outlets(scene, self.motion, start.mass) if scene.outlets else None
-        self.schedule = self.stepper.schedule(scene, self.particles, self.grid, self.timeline)
-        self.schedule.debug = debug
-        self.schedule.sound = self.sound
-
         self.overhead = Overhead(self.particles)
         self._tally = Tally(self.schedule.levels)
-        self._sorts = 0
         self._time = 0.0
-        self._count_in(self.timeline.tick)
         self.stop_asked: Callable[[], bool] = lambda: False
         """Asked after every step; once it is true `advance_to` raises `Interrupted`, and may be called again."""
         self._gravity_work = 0.0
@@ -161,57 +76,40 @@ class Simulation:
         began = clock.perf_counter()
         # So that the first step puts them in this order.
         self.motion.sort_particles(self.timeline.now, self.timeline.tick)
-        self._start()
+        if started:
+            self.start()
         self.setup_seconds = clock.perf_counter() - began
 
-    def _start(self) -> None:
-        self.step()  # lines 1-2: validity 0, so everybody is due now, where the first forces are evaluated
-        self.schedule.take_counts()
-        self.schedule.begin(
-            self.timeline, self.timeline.now
-        )  # as the line above: so that `wall_seconds` holds no compilation
-        ti.sync()
+    particles, near, grid, walls = (_part(name) for name in ("particles", "near", "grid", "walls"))
+    medium, density, motion, timeline = (_part(name) for name in ("medium", "density", "motion", "timeline"))
+    schedule, inflows, outlets, sound = (_part(name) for name in ("schedule", "inflows", "outlets", "sound"))
 
-    def _count_in(self, tick: float) -> None:
-        """Let all that the scene moves be counted in ticks of this length [s]."""
-        self._counted_in = tick
-        for part in parts(self, Ticking):
-            part.count_in(tick)
+    def start(self) -> None:
+        """Evaluate the first forces (lines 1-2: validity 0, so that all are due).
+
+        A new simulation has done so, unless it was made with `started=False`.
+        """
+        self.step()
+        self.schedule.take_counts()
+        self.schedule.begin(self.timeline, self.timeline.now)  # so that `wall_seconds` holds no compilation
+        ti.sync()
 
     def step(self) -> None:
         """Do what is due at the present tick: lines 4-29 of Algorithm 1."""
-        now, tick = self.timeline.now, self.timeline.tick
-        if tick != self._counted_in:  # another courant, on the same kernels
-            self._count_in(tick)
-        schedule = self.schedule
+        solver, schedule, motion = self.solver, self.solver.schedule, self.solver.motion
+        now, tick = solver.timeline.now, solver.timeline.tick
+        solver.count_in(tick)
         with self.overhead.shared:
             if schedule.needs_sorting:
-                self._sort(now, tick)  # line 4
-            if self.sound and schedule.needs_sound:
-                self.sound.update(schedule.read_at, now, tick)
+                solver.sort(now, tick, self._collect_counts)  # line 4
+            solver.find_sound(now, tick)
             schedule.select(now, tick)  # lines 5-16
-            self.motion.predict_neighbourhood(schedule.read_at, now, tick)  # lines 25-26, where somebody looks
+            motion.predict_neighbourhood(schedule.read_at, now, tick)  # lines 25-26, where a due particle reads
         with self.overhead.due:
-            if self.motion.moving_walls:
-                self.motion.observe_walls(schedule, now, tick)
-            self.density.update(schedule, now, tick)  # lines 18-21
-            self.motion.advance_due(schedule, now, tick)  # lines 22-29
+            solver.observe_walls(now, tick)
+            solver.density.update(schedule, now, tick)  # lines 18-21
+            motion.advance_due(schedule, now, tick)  # lines 22-29
         schedule.observe(now, tick)
-
-    def _sort(self, now: int, tick: float) -> None:
-        if self.inflows and self.inflows.waiting(now * tick):
-            self._collect_counts()
-            self.inflows.enter(self.particles, now, tick)
-        if self.outlets and (leaving := self.outlets.find(now, tick)):
-            self._collect_counts()
-            self.outlets.take_out(leaving, now, tick)
-        if self._sorts % REORDER_EVERY == 0:
-            self.particles.reorder(self.grid.order)
-            if self.grid.tracks_arrivals:
-                self.grid.arrived.fill(1)  # so that all blocks are looked at now and then
-        self._sorts += 1
-        self.motion.sort_particles(now, tick)
-        self.schedule.sorted(now, tick)
 
     def advance_to(self, time: float) -> None:
         """Run all steps up to physical `time` [s]; readers then predict to exactly that time.

@@ -2,10 +2,10 @@ import os
 from contextlib import contextmanager
 
 import pytest
-import taichi as ti
 
 import taichi_rts as rts
 from taichi_rts.device import backend
+from taichi_rts.device.backend import ti
 
 QUICK = {"advanced_optimization": False}
 """Compiles a quarter faster. Not where bits of different kernels are compared."""
@@ -102,4 +102,4 @@ def simulate(kernel_cache):
 @pytest.fixture
 def unstarted(monkeypatch):
     """Simulations evaluate no first forces, so that next to nothing is compiled: for what they know before."""
-    monkeypatch.setattr(rts.Simulation, "_start", lambda sim: None)
+    monkeypatch.setattr(rts.Simulation, "start", lambda sim: None)

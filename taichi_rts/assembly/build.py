@@ -1,10 +1,160 @@
-"""The parts of a run, from its scene."""
+"""From a scene and a stepper to the parts of a run: `assemble` makes each once, in the order in which they need each other."""
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from typing import Any
 
-from taichi_rts.solver.physics.continuity import ContinuityDensity
-from taichi_rts.solver.physics.density import SummationDensity
+import numpy as np
 
-DENSITIES: dict[str, Any] = {"summation": SummationDensity, "continuity": ContinuityDensity}
+from taichi_rts.assembly.inventory import parts
+from taichi_rts.assembly.walls import make_keepers, make_walls
+from taichi_rts.device.backend import Backend
+from taichi_rts.medium.medium import Medium
+from taichi_rts.sampling.sampling import Sample
+from taichi_rts.scene.scene import Scene
+from taichi_rts.solver.grid.geometry import Geometry
+from taichi_rts.solver.grid.grid import BlockGrid
+from taichi_rts.solver.grid.windows import FluidWindows, WallWindows
+from taichi_rts.solver.motion.inflow import Inflows
+from taichi_rts.solver.motion.motion import Motion
+from taichi_rts.solver.motion.outlet import Outlets
+from taichi_rts.solver.particles.neighbourhood import Neighbourhood
+from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.physics.continuity import ContinuityDensity, DensityDiffusion, MirroredPressure
+from taichi_rts.solver.physics.density import Density, SummationDensity
+from taichi_rts.solver.physics.momentum import Gravity, MomentumEquation, Pressure
+from taichi_rts.solver.physics.timetable import Ticking
+from taichi_rts.solver.physics.viscosity import viscosity_terms
+from taichi_rts.solver.solver import Solver
+from taichi_rts.solver.sound.floating_reference import FloatingReference
+from taichi_rts.solver.sound.rule import SoundRule
+from taichi_rts.solver.stepping.base import Stepper
+
+DENSITIES: dict[str, type[Density]] = {"summation": SummationDensity, "continuity": ContinuityDensity}
+
+
+def assemble(scene: Scene, stepper: Stepper, start: Sample, backend: Backend, *, debug: bool = False) -> Solver:
+    """Build the parts of a run of `scene`, whose coordinates are counted from its origin, from its particles at the `start`."""
+    timeline = stepper.timeline(scene)
+    needs = optional_fields(scene, stepper, debug)
+    inflows = Inflows(scene, start.mass) if scene.inflows else None
+    particles = make_particles(scene, start, backend, needs, inflows.capacity if inflows else 0)
+    geometry = make_geometry(scene, stepper)
+    grid = BlockGrid(geometry, particles.capacity, particles.alive)
+    sound = SoundRule(scene, particles, grid) if particles.has_sound else None
+    medium = make_medium(scene, start, particles, sound)
+    near = Neighbourhood(particles.capacity, scene.dim, backend, needs, geometry)
+    particles.borrow(near.spare, grid.rank)
+    particles.carry(grid.cell_of)
+    walls = make_walls(scene, start, near, grid, backend)
+    windows = make_windows(scene, near, grid, walls, backend, needs)
+    density = DENSITIES[scene.density](particles, near, grid, windows, walls, medium, backend)
+    motion = Motion(
+        particles,
+        near,
+        grid,
+        make_momentum(scene, particles, near, grid, windows, walls, medium, backend),
+        stepper.make_integrator(),
+        medium,
+        integrates_density=density.integrates,
+        obstacles=make_keepers(scene, geometry),
+    )
+    outlets = Outlets(scene, motion, start.mass) if scene.outlets else None
+    schedule = stepper.schedule(scene, particles, grid, timeline)
+    schedule.debug, schedule.sound = debug, sound
+    solver = Solver(particles, near, grid, walls, medium, density, motion, timeline, schedule, inflows, outlets, sound)
+    solver.ticking = parts(solver, Ticking)
+    solver.count_in(timeline.tick)
+    return solver
+
+
+def optional_fields(scene: Scene, stepper: Stepper, debug: bool) -> frozenset[str]:
+    """Names of the fields of `Particles` and `Neighbourhood` that only some runs need."""
+    wanted = {
+        "rho_rate": stepper.extrapolates_density,
+        "past": stepper.keeps_past,
+        "viscosity": len(set(scene.viscosities)) > 1,
+        "guided_until": bool(scene.inflows),
+        "sound": scene.regional_sound is not None,
+        "budget": debug,
+    }
+    return DENSITIES[scene.density].needs | {name for name, needed in wanted.items() if needed}
+
+
+def make_particles(scene: Scene, start: Sample, backend: Backend, needs: frozenset[str], unborn: int) -> Particles:
+    """Return the particles of the `start`, with room for `unborn` more."""
+    particles = Particles(
+        start.positions,
+        start.velocities,
+        start.densities,
+        scene.rest_density,
+        backend,
+        needs,
+        len(start.positions) + unborn,
+    )
+    if particles.has_viscosity:
+        particles.viscosity.from_numpy(np.pad(start.viscosities, (0, unborn)).astype(backend.numpy_dtype))
+    return particles
+
+
+def make_geometry(scene: Scene, stepper: Stepper) -> Geometry:
+    """Return the blocks of the domain, wider than the support by what particles drift until the next sort."""
+    drift = stepper.drift * scene.support
+    return Geometry(scene.domain.lower, scene.domain.upper, scene.support, drift, scene.is_periodic)
+
+
+def make_medium(scene: Scene, start: Sample, particles: Particles, sound: SoundRule | None) -> Medium:
+    """Return the fluid's constants, with the equation of state that belongs to its sound speed."""
+    medium = Medium.of(scene, start.mass)
+    if sound is None:
+        return medium
+    return dataclasses.replace(medium, equation_of_state=FloatingReference(medium.equation_of_state, particles, sound))
+
+
+def make_windows(
+    scene: Scene,
+    near: Neighbourhood,
+    grid: BlockGrid,
+    walls: list[Any],
+    backend: Backend,
+    needs: frozenset[str],
+) -> FluidWindows | None:
+    """Return the windows on the fluid that a CPU's threads copy from, and give walls at rest theirs."""
+    if backend.arch != "cpu":
+        return None
+    per_block = math.prod(grid.geometry.sides) / scene.spacing**scene.dim
+    windows = FluidWindows(near, grid, per_block, backend, needs)
+    for wall in walls:
+        if not wall.moves and not grid.geometry.repeats:  # whose images would need places of their own
+            wall.windows = WallWindows(wall)
+    return windows
+
+
+def make_momentum(
+    scene: Scene,
+    particles: Particles,
+    near: Neighbourhood,
+    grid: BlockGrid,
+    windows: FluidWindows | None,
+    walls: list[Any],
+    medium: Medium,
+    backend: Backend,
+) -> MomentumEquation:
+    """Return the momentum equation with the terms that the scene has."""
+    integrates = DENSITIES[scene.density].integrates
+    gravity = Gravity(scene)
+    return MomentumEquation(
+        MirroredPressure(near, scene) if integrates else Pressure(near),
+        viscosity_terms(scene, medium, near),
+        near,
+        grid,
+        windows,
+        walls,
+        medium,
+        gravity,
+        backend,
+        with_rho_rate=particles.has_rho_rate,
+        diffusion=DensityDiffusion(medium, scene) if integrates else None,
+    )

@@ -7,9 +7,9 @@ import math
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
 from taichi_rts.assembly.work import Tally
+from taichi_rts.device.backend import ti
 from taichi_rts.simulation import Simulation
 from taichi_rts.solver.physics.timetable import LAST
 from taichi_rts.solver.stepping.base import Stepper
@@ -81,7 +81,7 @@ class Snapshot:
             sim.outlets.removed = list(self.removed)
             sim.outlets.energy, sim.outlets.work = self.left
             sim.outlets.looks = 0
-        sim._sorts = 0
+        sim.solver.sorts = 0
         sim.grid.order.from_numpy(np.arange(sim.particles.capacity, dtype=np.int32))
         sim.grid.forget()
         sim.schedule.read_at.fill(0)
@@ -94,7 +94,7 @@ class Snapshot:
             counter.clear()
         sim.schedule.restart(now)
         sim._tally = Tally(sim.schedule.levels, base_steps=sim.schedule.steps)
-        sim._start()
+        sim.start()
 
     def _fill(self, sim: Simulation, now: int) -> None:
         """Write the particles' fields: those that are there, then those that inflows may bring, then those that are gone."""

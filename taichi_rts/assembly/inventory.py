@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import taichi as ti
+
+from taichi_rts.device.backend import ti
 
 PACKAGE = "taichi_rts"
 PLAIN = (bool, int, float, str, type(None), np.ndarray, np.generic)

@@ -3,9 +3,8 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-import taichi as ti
 
-from taichi_rts.device.backend import Backend
+from taichi_rts.device.backend import Backend, ti
 from taichi_rts.sampling.walls import WallLayer
 from taichi_rts.scene.geometry.bodies import bodies
 from taichi_rts.scene.geometry.making import make_solid

@@ -32,8 +32,6 @@ LINING = 10 * SAMPLING
 """Bytes of the host per boundary particle of an obstacle and dimension: they are chosen from about ten times as many points."""
 COMPILED = 400 << 20
 """Bytes that Python, the compiler and compiled kernels take besides."""
-BLOCK_INTEGERS = {"uniform": 1, "regional": 9, "asynchronous": 8}
-"""Fields of 32-bit integers that each stepper has with an entry for each block."""
 FIXED = 1 << 14
 """Bytes of fields whose size does not depend on the scene, about."""
 WALL_SHARE = 0.45
@@ -92,7 +90,7 @@ def buffer_bytes(
     near = 2 * dim + 2 + (dim + 1) * integrated + viscous
     per_block = INTEGER * (2 * CELLS_PER_BLOCK + (1 if on_cpu else 3)) + real * SOUND_REALS * regional
     walls_per_block = INTEGER * (CELLS_PER_BLOCK + 1) * (1 + faces) + real * pose * turning
-    steps_per_block = INTEGER * BLOCK_INTEGERS.get(stepper.name, max(BLOCK_INTEGERS.values()))
+    steps_per_block = INTEGER * stepper.block_integers
     nodes = sum(_nodes(scene, spacing))
     windows = entries(room(dim, (scene.support_ratio * (1.0 + 2.0 * stepper.drift)) ** dim))
     wall_reals = 2 * dim + 1 + (scene.wall_planes > 1)

@@ -4,10 +4,9 @@ import copy
 import math
 from typing import Any
 
-import taichi as ti
-
 from taichi_rts.assembly.inventory import State
 from taichi_rts.assembly.resources import MOST_ADDRESSED
+from taichi_rts.device.backend import ti
 
 WIDEST = 8  # bytes of one entry
 

@@ -8,8 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.solver.particles.particles import Particles
 
 

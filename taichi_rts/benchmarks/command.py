@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-import taichi as ti
 from rich.console import Console
 from rich.table import Table
 
@@ -15,6 +14,7 @@ from taichi_rts.benchmarks import peers
 from taichi_rts.benchmarks.device import device
 from taichi_rts.benchmarks.plot import draw
 from taichi_rts.benchmarks.rows import ROWS, Row, Settings, profile
+from taichi_rts.device import forks
 from taichi_rts.errors import Error
 from taichi_rts.files.writing import write_bytes, write_json
 from taichi_rts.trials.plotting import require_plots
@@ -73,7 +73,7 @@ class Bench:
                 "machine": platform.processor() or platform.machine(),
                 "threads": settings.threads,
                 "arch": self.arch,
-                "taichi": ".".join(map(str, ti.__version__)),
+                **forks.versions(),
                 "rows": [row.as_dict() for row in found],
             }
             write_json(self.json, data)

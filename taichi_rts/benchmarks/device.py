@@ -5,12 +5,11 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Iterator
 
-import taichi as ti
-
 import taichi_rts as rts
 from taichi_rts.benchmarks import timing
 from taichi_rts.benchmarks.rows import Row, Settings, millions
 from taichi_rts.benchmarks.scenes import peers_dam_break
+from taichi_rts.device.backend import ti
 from taichi_rts.rendering.painter import Painter, PictureOptions
 
 CANDIDATES = 180  # pairs that a thread looks at with r = 2 spacings: 9 rows of 5 cells of 4

@@ -2,10 +2,9 @@
 
 import math
 
-import taichi as ti
-
 import taichi_rts as rts
 from taichi_rts.assembly.inventory import State
+from taichi_rts.device.backend import ti
 
 BYTES = {ti.f32: 4, ti.f64: 8, ti.i32: 4}
 

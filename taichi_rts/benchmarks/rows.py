@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
 import taichi_rts as rts
 from taichi_rts.benchmarks import peers, timing
 from taichi_rts.benchmarks.memory import memory_of
 from taichi_rts.benchmarks.scenes import FRONT_TIME, peers_dam_break
+from taichi_rts.device.backend import ti
 from taichi_rts.solver.stepping.regional import LARGEST_COURANT
 
 SETTLED = 0.05  # [s]: the column has left its lattice
@@ -290,9 +290,7 @@ def profile(settings: Settings) -> Iterator[Row]:
 
 
 def _kernel_records() -> list[Any]:
-    from taichi.profiler.kernel_profiler import get_default_kernel_profiler
-
-    profiler = get_default_kernel_profiler()
+    profiler = ti.profiler.kernel_profiler.get_default_kernel_profiler()
     profiler._update_records()
     profiler._count_statistics()
     return list(profiler._statistical_results.values())

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import taichi as ti
 
 import taichi_rts as rts
+from taichi_rts.device.backend import ti
 
 
 @dataclass(frozen=True)

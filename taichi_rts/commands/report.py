@@ -14,6 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from taichi_rts.assembly.work import speedup_bound
+from taichi_rts.device import forks
 from taichi_rts.device.backend import Backend
 from taichi_rts.medium.energy import Energy
 from taichi_rts.readings.diagnosis import Diagnosis
@@ -207,8 +208,8 @@ def print_scenes(scenes: list[Scene]) -> None:
 def print_info(support: Mapping[str, str]) -> None:
     """Print versions and arches."""
     table = Table("what", "here", show_header=False)
-    for name in ("taichi_rts", "taichi", "numpy"):
-        table.add_row(name, version(name))
+    for name, found in {"taichi_rts": version("taichi_rts"), **forks.versions(), "numpy": version("numpy")}.items():
+        table.add_row(name, found)
     table.add_row("python", platform.python_version())
     for arch, state in support.items():
         table.add_row(f"arch {arch}", state)

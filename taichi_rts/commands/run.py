@@ -27,7 +27,7 @@ from taichi_rts.output.resume import (
 from taichi_rts.readings.extremes import Extremes
 from taichi_rts.rendering.painter import Mode, PictureOptions, View, make_cameras
 from taichi_rts.scene.checks.size import warn_of_size
-from taichi_rts.solver.stepping.steppers import STEPPERS
+from taichi_rts.solver.stepping.steppers import STEPPERS, StepperName
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Run:
     """Where kernels run; auto takes the first of cuda, vulkan, cpu that is there. A named one never falls back."""
     precision: Literal["f32", "f64"] | None = None
     """Floating-point precision; by default f32."""
-    stepper: Literal["uniform", "regional", "asynchronous"] | None = None
+    stepper: StepperName | None = None
     """One step for all, a step for each block, or a time for each block; by default regional."""
     preset: Literal["paper"] | None = None
     """Regional: the paper's setting (courant 0.4, 3 levels, Eq. 1 not enforced beyond level 1)."""
@@ -240,7 +240,7 @@ class Run:
         name = self.stepper or rts.Regional.name
         kind = STEPPERS[name]
         given = self.stepper_options()
-        if foreign := sorted(set(given) - set(kind.__dataclass_fields__)):
+        if foreign := sorted(set(given) - {field.name for field in dataclasses.fields(kind)}):
             raise rts.StepperError(f"{flags(foreign)} does not belong to the {name} stepper; leave it out")
         return kind(**given)
 
@@ -261,7 +261,9 @@ class Run:
         return dataclasses.replace(self, **{key: getattr(Run, key) for key in ("stepper", *STEPPER_OPTIONS)})
 
 
-STEPPER_OPTIONS = sorted({key for kind in STEPPERS.values() for key in kind.__dataclass_fields__} & set(vars(Run)))
+STEPPER_OPTIONS = sorted(
+    {field.name for kind in STEPPERS.values() for field in dataclasses.fields(kind)} & set(vars(Run))
+)
 """Options of `Run` that are some stepper's parameters."""
 NOT_IN_WINDOW = (
     *("panels", "debug", "strict", "resume", "checkpoint_every", "frames", "video", "gif", "export", "attributes"),

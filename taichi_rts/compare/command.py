@@ -19,6 +19,7 @@ import taichi_rts as rts
 from taichi_rts.compare import analysis, folder, references, sweeps, table
 from taichi_rts.compare.measures import PARTED
 from taichi_rts.compare.runner import COURANTS, Settings, compare, plan
+from taichi_rts.device import forks
 from taichi_rts.errors import Error
 from taichi_rts.scene.scene import Scene
 from taichi_rts.terminal import console
@@ -172,7 +173,7 @@ class Compare:
             "command": shlex.join(["taichi-rts", *sys.argv[1:]]),
             "settings": {f.name: _plain(getattr(self, f.name)) for f in dataclasses.fields(self)},
             "version": version("taichi_rts"),
-            "versions": {name: version(name) for name in ("taichi", "numpy")} | {"python": platform.python_version()},
+            "versions": forks.versions() | {"numpy": version("numpy"), "python": platform.python_version()},
             "device": platform.processor() or platform.machine(),
         }
 

@@ -8,13 +8,13 @@ import math
 import os
 import platform
 import zipfile
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import taichi_rts as rts
 from taichi_rts.compare.jobs import Job
 from taichi_rts.compare.trajectory import Trajectory
+from taichi_rts.device import forks
 from taichi_rts.errors import OutputError
 from taichi_rts.files.writing import write_bytes
 from taichi_rts.solver.stepping.steppers import stepper_data
@@ -52,7 +52,7 @@ def job_key(job: Job, *more: str) -> str:
     """Return the SHA-256 of all that decides what a job gives: its data, the solver's source files, Taichi, the processor."""
     scene = {key: value for key, value in job.scene.items() if key not in IDLE}
     facts = [scene, job.stepper, job.samples, job.arch, job.precision, job.repeats, job.reference]
-    about = [source_hash(), version("taichi"), platform.machine(), *more]
+    about = [source_hash(), forks.versions(), platform.machine(), *more]
     return hashlib.sha256(json.dumps([facts, about], sort_keys=True).encode()).hexdigest()
 
 

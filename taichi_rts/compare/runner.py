@@ -32,7 +32,7 @@ class Settings:
     """What to compare, and how.
 
     Attributes:
-        steppers: names of `sweeps.KINDS`.
+        steppers: names of `sweeps.kinds`.
         courants: the sweep's numbers (`sweeps.make_stepper`).
         sets: sweeps of other parameters, each "KEY=VALUE,VALUE".
         samples: number of equal intervals at whose ends runs are compared.

@@ -9,26 +9,30 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-import taichi_rts as rts
 from taichi_rts.errors import Error, SceneError, StepperError
 from taichi_rts.scene.scene import Scene
+from taichi_rts.solver.stepping.steppers import setups
 
-KINDS: dict[str, Any] = {
-    "uniform": rts.Uniform,
-    "regional": rts.Regional,
-    "paper": rts.Regional,
-    "asynchronous": rts.Asynchronous,
-    "uniform-c": rts.Uniform,
-    "regional-c": rts.Regional,
-    "asynchronous-c": rts.Asynchronous,
-}
-"""Steppers that can be compared, by the name on the command line; `paper` is `Regional(preset="paper")`, and those that end in
-"-c" run with the regional sound speed, `uniform-c` with one adaptive step for all."""
-ONE_SOUND_SPEED = ("uniform", "regional", "paper", "asynchronous")
+ONE_SOUND_SPEED = tuple(name for name, (_kind, setup) in setups("compared").items() if not setup.regional_sound)
+"""Those of `kinds` that are compared by default."""
 FIXED = {"courant": "--courants", "preset": "--steppers paper", "end_time": "--end-time"}
 """Parameters that are no sweep, and the option to use instead."""
 SHAPE = ("domain", "fluids", "probes", "gauges", "view", "name", "description")
 """What makes a scene the scene it is, or changes no motion."""
+
+
+def kinds() -> dict[str, Any]:
+    """Classes of all steppers that can be compared, by the name on the command line (`Stepper.compared`).
+
+    `paper` is `Regional(preset="paper")`, and those that end in "-c" run with the regional sound speed, `uniform-c` with one
+    adaptive step for all.
+    """
+    return {name: kind for name, (kind, _setup) in setups("compared").items()}
+
+
+def parameters(kind: Any) -> set[str]:
+    """Names of the parameters of a stepper's class, or of the scene's."""
+    return {field.name for field in dataclasses.fields(kind)}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,7 +52,7 @@ def parse_sweep(text: str) -> Sweep:
             f"--set {text!r} is not KEY=VALUE,VALUE; write e.g. --set levels=2,3 or --set regional.alpha=0.2,0.4"
         )
     target, dot, key = name.strip().rpartition(".")
-    targets = (*KINDS, "scene")
+    targets = (*kinds(), "scene")
     if dot and target not in targets:
         raise Error(f"--set {text!r}: {target!r} is {_unknown(target, targets)}")
     key = key.replace("-", "_")
@@ -66,11 +70,8 @@ def parse_sweep(text: str) -> Sweep:
 
 def known_keys(target: str) -> list[str]:
     """Parameters of a stepper, or of the scene, that can be swept."""
-    kind = Scene if target == "scene" else KINDS[target]
-    return sorted(
-        set(kind.__dataclass_fields__)
-        - {*FIXED, *SHAPE, "name", "keeps_past", "drift", "extrapolates_density", "follows_sound"}
-    )
+    kind = Scene if target == "scene" else kinds()[target]
+    return sorted(parameters(kind) - {*FIXED, *SHAPE})
 
 
 def split_values(text: str) -> list[str]:
@@ -102,15 +103,13 @@ def parse_scalar(text: str) -> Any:
 
 def for_stepper(sweeps: Sequence[Sweep], name: str) -> list[dict[str, Any]]:
     """All combinations of the parameters that `sweeps` give the stepper `name`; one empty one if there are none."""
-    kind = KINDS[name]
-    return _combine(
-        [s for s in sweeps if s.target == name or (s.target is None and s.key in kind.__dataclass_fields__)]
-    )
+    known = parameters(kinds()[name])
+    return _combine([s for s in sweeps if s.target == name or (s.target is None and s.key in known)])
 
 
 def for_scene(sweeps: Sequence[Sweep], steppers: Sequence[str]) -> list[dict[str, Any]]:
     """All combinations of the scene's parameters: those named so, and those that no chosen stepper has."""
-    taken = {key for name in steppers for key in KINDS[name].__dataclass_fields__}
+    taken = {key for name in steppers for key in parameters(kinds()[name])}
     return _combine([s for s in sweeps if s.target == "scene" or (s.target is None and s.key not in taken)])
 
 
@@ -122,7 +121,7 @@ def check(sweeps: Sequence[Sweep], steppers: Sequence[str]) -> None:
             raise Error(f"--set {sweep.key} comes twice; give all its values in one")
         seen.add((sweep.target, sweep.key))
         if sweep.target is None:
-            idle = not any(sweep.key in KINDS[name].__dataclass_fields__ for name in steppers)
+            idle = not any(sweep.key in parameters(kinds()[name]) for name in steppers)
             idle = idle and sweep.key not in known_keys("scene")
         else:
             idle = sweep.target not in (*steppers, "scene")
@@ -140,21 +139,15 @@ def make_stepper(name: str, courant: float, options: dict[str, Any]) -> Any:
     divides by itself), and of the longest step of `Asynchronous`. Only `paper` is by its base step, as the paper means it. With
     the regional sound speed it is that of every step with its own sound speed.
     """
-    kind = KINDS[name]
-    if name == "uniform-c":
-        return kind(courant=courant, adaptive=True, **options)
-    if name == "paper":
-        return kind(preset="paper", courant=courant, **options)
-    if name == "regional":
-        resolved = kind(**options)
-        if not resolved.resolved("strict_cfl"):
-            return kind(courant=courant / resolved.resolved("levels"), **options)
-    return kind(courant=courant, **options)
+    kind, setup = setups("compared")[name]
+    if setup.of_longest and not setup.regional_sound:
+        return kind(**setup.parameters, **options).with_longest(courant)
+    return kind(courant=courant, **setup.parameters, **options)
 
 
 def changes_by(name: str) -> dict[str, Any]:
     """What the stepper `name` changes in the scene."""
-    return {"sound_speed": "regional"} if name.endswith("-c") else {}
+    return {"sound_speed": "regional"} if setups("compared")[name][1].regional_sound else {}
 
 
 def scenes_of(scene: Scene, changes: list[dict[str, Any]]) -> list[Scene]:
@@ -188,10 +181,10 @@ def choose(text: str) -> list[str]:
     """Read a list of steppers such as "uniform,paper"; raises `StepperError` for an unknown or missing one."""
     names = list(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
     if not names:
-        raise StepperError(f"--steppers {text!r} names none; choose from {', '.join(KINDS)}")
+        raise StepperError(f"--steppers {text!r} names none; choose from {', '.join(kinds())}")
     for name in names:
-        if name not in KINDS:
-            raise StepperError(f"--steppers: {name!r} is {_unknown(name, list(KINDS))}")
+        if name not in kinds():
+            raise StepperError(f"--steppers: {name!r} is {_unknown(name, list(kinds()))}")
     return names
 
 

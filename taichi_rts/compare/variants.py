@@ -20,7 +20,7 @@ class Variant:
 
     Attributes:
         scene: number of the scene among those compared.
-        family: one of `sweeps.KINDS`.
+        family: one of `sweeps.kinds`.
         courant: the sweep's number (`sweeps.make_stepper`).
         options: the stepper's parameters that were set.
         changes: the scene's parameters that were set.
@@ -64,7 +64,7 @@ def make_variants(
             for options in sweeps.for_stepper(sets, family):
                 for courant in courants:
                     stepper = sweeps.make_stepper(family, courant, options)
-                    equal = courant if sweeps.changes_by(family) else equal_step(stepper, scene)
+                    equal = courant if sweeps.changes_by(family) else stepper.equal_step(scene)
                     here.append(Variant(number, family, courant, options, changes, stepper_data(stepper), equal))
         bases = [uniform_variant(v.scene, v.equal_step, changes, BASE_STEP) for v in here if v.family != "uniform"]
         known = {(v.courant) for v in here if v.family == "uniform" and not v.options}
@@ -77,15 +77,6 @@ def uniform_variant(scene: int, courant: float, changes: dict[str, Any], role: s
     """Return a run with uniform steps at their defaults."""
     stepper = stepper_data(rts.Uniform(courant=courant))
     return Variant(scene, "uniform", courant, {}, changes, stepper, courant, role)
-
-
-def equal_step(stepper: Any, scene: Scene) -> float:
-    """Courant number of the uniform steps that are compared at equal step; rounded, so that equal steps are equal numbers."""
-    tick = stepper.timeline(scene).tick
-    if isinstance(stepper, rts.Uniform):
-        return stepper.courant
-    longest = tick * (stepper.levels if isinstance(stepper, rts.Asynchronous) else 1)
-    return float(f"{longest * scene.wave_speed / scene.support:.10g}")
 
 
 def smallest_step(variants: Sequence[Variant]) -> float:

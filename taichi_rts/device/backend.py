@@ -1,4 +1,7 @@
-"""The only place that calls `ti.init`: which device runs the kernels, and in which precision."""
+"""The only file that imports Taichi, and the only place that calls `ti.init`: device and precision of the kernels.
+
+All others import `ti` from here, so that one environment variable chooses a fork of Taichi for all of them (`forks.py`).
+"""
 
 from __future__ import annotations
 
@@ -7,29 +10,56 @@ import ctypes
 import ctypes.util
 import io
 import os
+import sys
 from dataclasses import dataclass
-from typing import Any
-
-from taichi_rts.device import kernel_cache
-
-os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
-os.environ.update(kernel_cache.home_for_taichi())
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import taichi as ti
-from taichi.lang import kernel_impl
-from taichi.lang.ast import ast_transformer_utils
 
-from taichi_rts.device import source_cache
+from taichi_rts.device import forks, kernel_cache, ownership, source_cache
 from taichi_rts.device.ownership import Start, holds_fields, require_own_process
 from taichi_rts.errors import BackendError
+from taichi_rts.importing import PROGRAM, runs_as_program
+
+
+def _import_taichi() -> tuple[forks.Fork, Any]:
+    """Import Taichi, or the fork that the environment names.
+
+    Raises `BackendError` if the name is unknown or the fork is not installed; the command line then ends with one line.
+    """
+    try:
+        fork = forks.chosen()
+        os.environ.setdefault(fork.banner, "0")
+        os.environ.update(kernel_cache.home_for_taichi())
+        try:
+            return fork, import_module(fork.module)
+        except ModuleNotFoundError as error:
+            if error.name != fork.module:
+                raise
+            raise forks.missing(fork) from None
+    except BackendError as error:
+        if runs_as_program(sys.argv, sys.orig_argv):
+            print(f"{PROGRAM}: error: {error}", file=sys.stderr)
+            sys.exit(2)
+        raise
+
+
+if TYPE_CHECKING:
+    import taichi as ti
+
+    FORK: forks.Fork
+else:
+    FORK, ti = _import_taichi()
+ownership.watch(ti)
+source_cache.remember(import_module(f"{FORK.module}.lang.ast.ast_transformer_utils"), ti.lang.kernel_impl)
 
 ARCHES = ("cuda", "vulkan", "cpu")  # the order in which `auto` tries them
 PRECISIONS = {"f32": (ti.f32, np.float32), "f64": (ti.f64, np.float64)}
 _REMEDIES = {
     "cuda": "install an NVIDIA driver, or use --arch cpu",
     "vulkan": "install a Vulkan driver (Debian: apt-get install libvulkan1 mesa-vulkan-drivers), or use --arch cpu",
-    "cpu": "reinstall taichi for this platform",
+    "cpu": f"reinstall {FORK.package} for this platform",
 }
 CHUNK = 512
 """Iterations of a loop that Taichi gives to a CPU thread at a time, whatever `block_dim` says; shorter loops run in one."""
@@ -68,7 +98,6 @@ _start_of_current: Start | None = None
 _asked_for = ""
 """Arch that `init` was given; empty where it uses a Taichi that others have started."""
 _options: dict[str, Any] = {}
-source_cache.remember(ast_transformer_utils, kernel_impl)
 _DEFAULT_CACHE = str(ti.lang.impl.default_cfg().offline_cache_file_path)
 
 
@@ -168,7 +197,7 @@ def _remember(backend: Backend, asked_for: str, options: dict[str, Any]) -> Back
 def _running(arch: str, precision: str | None) -> Backend:
     """Return what `ti.init` has started; raises `BackendError` if there is nothing, or it is not as asked for or as needed."""
     runtime = ti.lang.impl.get_runtime()
-    if runtime.prog is None:
+    if ownership.program(runtime) is None:
         raise BackendError("there is no Taichi to reuse; call ti.init first, or leave out reuse")
     found = {getattr(ti, name): name for name in ARCHES}.get(ti.lang.impl.current_cfg().arch)
     if found is None or arch not in ("auto", found):
@@ -222,8 +251,11 @@ def _start(name: str, precision: str, options: dict[str, Any]) -> bool:
         return False
     if name == "vulkan" and not vulkan_device_types():
         return False
-    settings = {"log_level": ti.ERROR, "enable_fallback": False} | options
-    folder = str(options.get("offline_cache_file_path") or os.environ.get(kernel_cache.VARIABLE) or _DEFAULT_CACHE)
+    settings = {"log_level": ti.ERROR, "enable_fallback": False} | FORK.options | options
+    folder = str(os.environ.get(kernel_cache.VARIABLE) or _DEFAULT_CACHE)
+    if FORK.module != "taichi":  # each throws away what it finds of another
+        folder = os.path.join(folder, FORK.module)
+    folder = str(options.get("offline_cache_file_path") or folder)
     settings["offline_cache_file_path"] = kernel_cache.usable_folder(folder)
     others = _thread_ids()
     try:

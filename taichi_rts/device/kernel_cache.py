@@ -13,6 +13,8 @@ import sys
 import tempfile
 import warnings
 
+from taichi_rts.device import forks
+
 VARIABLE = "TI_OFFLINE_CACHE_FILE_PATH"
 
 
@@ -55,8 +57,9 @@ def _temporary_folder() -> str:
 
     def remove() -> None:
         if os.getpid() == owner:  # not a forked child
-            if "taichi" in sys.modules:
-                sys.modules["taichi"].reset()  # it writes its kernels when it ends
+            taichi = sys.modules.get(forks.chosen().module)
+            if taichi is not None:
+                taichi.reset()  # it writes its kernels when it ends
             shutil.rmtree(folder, ignore_errors=True)
 
     atexit.register(remove)

@@ -15,9 +15,6 @@ import threading
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from taichi.lang import impl
-from taichi.lang._ndarray import Ndarray
-
 from taichi_rts.errors import BackendError
 
 FORKED = (
@@ -25,20 +22,30 @@ FORKED = (
     'multiprocessing.get_context("spawn"), and call taichi_rts.init in each process (docs/starting.md)'
 )
 T = TypeVar("T", bound=type)
+_taichi: Any = None
+"""The module, as `backend` has imported it; it cannot be had from there, which imports this file."""
 _lost = False
+
+
+def watch(taichi: Any) -> None:
+    """Say which module is Taichi; `backend` does so once, before anything else here is called."""
+    global _taichi
+    _taichi = taichi
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(after_in_child=_forget_in_child)
 
 
 class Start:
     """One start of Taichi, in this process and this thread."""
 
     def __init__(self) -> None:
-        self._runtime = impl.get_runtime()  # a new object after each `ti.init` and `ti.reset`
+        self._runtime = _runtime()
         self._thread, self._thread_name = threading.get_ident(), threading.current_thread().name
 
     @property
     def lives(self) -> bool:
         """Whether Taichi has neither been started again nor reset since."""
-        return impl.get_runtime() is self._runtime and self._runtime.prog is not None
+        return _runtime() is self._runtime and program(self._runtime) is not None
 
     @property
     def is_here(self) -> bool:
@@ -72,14 +79,16 @@ def require_own_process() -> None:
 
 def holds_fields() -> bool:
     """Whether anything would be lost if Taichi were started again: fields or arrays, ours or the user's."""
-    runtime = impl.get_runtime()
-    if runtime.prog is None:
+    runtime = _runtime()
+    started = program(runtime)
+    if started is None:
         return False
-    if runtime.prog.get_snode_tree_size() or runtime.global_vars or not impl.root.empty:
+    if started.get_snode_tree_size() or runtime.global_vars or not _taichi.lang.impl.root.empty:
         return True
     # Taichi keeps no list of its arrays.
     return any(
-        isinstance(thing, Ndarray) and getattr(thing, "_runtime", runtime) is runtime for thing in gc.get_objects()
+        isinstance(thing, _taichi.Ndarray) and getattr(thing, "_runtime", runtime) is runtime
+        for thing in gc.get_objects()
     )
 
 
@@ -99,6 +108,19 @@ def guarded(*plain: str) -> Callable[[T], T]:
     return decorate
 
 
+def program(runtime: Any) -> Any:
+    """Return what Taichi has started, None if nothing."""
+    return getattr(runtime, _program_name(runtime))
+
+
+def _program_name(runtime: Any) -> str:
+    return "_prog" if hasattr(runtime, "_prog") else "prog"  # quadrants' `prog` raises where there is none
+
+
+def _runtime() -> Any:
+    return _taichi.lang.impl.get_runtime()  # a new object after each `ti.init` and `ti.reset`
+
+
 def _checked(method: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(method)
     def checked(self: Any, *args: Any, **options: Any) -> Any:
@@ -111,13 +133,10 @@ def _checked(method: Callable[..., Any]) -> Callable[..., Any]:
 def _forget_in_child() -> None:
     """In a forked child let go of Taichi's program: to use it, and even to end it, waits for threads that there are not."""
     global _lost
-    runtime = impl.get_runtime()
-    if runtime.prog is not None:
+    runtime = _runtime()
+    started = program(runtime)
+    if started is not None:
         _lost = True
         with contextlib.suppress(AttributeError):  # no CPython
-            ctypes.pythonapi.Py_IncRef(ctypes.py_object(runtime.prog))  # so that its destructor never runs
-        runtime.prog = None
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_forget_in_child)
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(started))  # so that its destructor never runs
+        setattr(runtime, _program_name(runtime), None)

@@ -2,7 +2,7 @@
 
 import math
 
-import taichi as ti
+from taichi_rts.device.backend import ti
 
 
 @ti.data_oriented

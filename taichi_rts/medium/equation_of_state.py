@@ -3,7 +3,8 @@
 from typing import Any
 
 import numpy as np
-import taichi as ti
+
+from taichi_rts.device.backend import ti
 
 
 @ti.func

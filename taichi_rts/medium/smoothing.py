@@ -8,7 +8,8 @@ import math
 from typing import Any
 
 import numpy as np
-import taichi as ti
+
+from taichi_rts.device.backend import ti
 
 
 @ti.func

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
 from taichi_rts.assembly.inventory import State
-from taichi_rts.device import backend
+from taichi_rts.device import backend, forks
+from taichi_rts.device.backend import ti
 from taichi_rts.errors import CheckpointError, Error
 from taichi_rts.files.archive import Archive, open_archive, write_archive
 from taichi_rts.scene.files.reading import moved_along, parts_with_files, places_beside, require_files_near
@@ -79,7 +79,7 @@ def write(
     header = {
         "format": FORMAT,
         "version": version("taichi_rts"),
-        "versions": {"taichi": version("taichi"), "numpy": version("numpy"), "python": platform.python_version()},
+        "versions": forks.versions() | {"numpy": version("numpy"), "python": platform.python_version()},
         "arch": device.arch,
         "precision": device.precision,
         "extra": dict(extra or {}),
@@ -225,9 +225,7 @@ def _entry_shape(field: Any) -> tuple[int, ...]:
 
 
 def _numpy_type(dtype: Any) -> Any:
-    from taichi.lang.util import to_numpy_type
-
-    return to_numpy_type(dtype)
+    return ti.lang.util.to_numpy_type(dtype)
 
 
 def _encoded(value: Any, key: str, arrays: dict[str, np.ndarray]) -> Any:

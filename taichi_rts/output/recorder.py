@@ -19,7 +19,7 @@ import numpy as np
 
 from taichi_rts.assembly.frame_times import frame_times
 from taichi_rts.assembly.resources import require
-from taichi_rts.device import backend
+from taichi_rts.device import backend, forks
 from taichi_rts.errors import CheckpointError, Interrupted, OutputError, SimulationDivergedError
 from taichi_rts.files.film import Gif, Video, require_video
 from taichi_rts.files.lock import FolderLock
@@ -354,5 +354,5 @@ def describe_run(sim: Simulation, initial_energy: Any) -> dict[str, Any]:
             "work": sim.work() if sim.keeps_work else None,
         },
         "version": version("taichi_rts"),
-        "versions": {name: version(name) for name in ("taichi", "numpy")} | {"python": platform.python_version()},
+        "versions": forks.versions() | {"numpy": version("numpy"), "python": platform.python_version()},
     }

@@ -2,11 +2,12 @@
 
 from typing import Any
 
-from taichi.lang import impl
-from taichi.lang._ndarray import ScalarNdarray
+from taichi_rts.device.backend import ti
+
+_impl = ti.lang.impl  # None while the interpreter ends
 
 
-class Buffer(ScalarNdarray):
+class Buffer(ti.ScalarNdarray):
     """A `ti.ndarray` of scalars that is freed only in the runtime it was made in.
 
     Taichi 1.7.4 finds the array to free by its address. One of before a `ti.init` that Python collects after it
@@ -16,8 +17,8 @@ class Buffer(ScalarNdarray):
 
     def __init__(self, dtype: Any, count: int) -> None:
         super().__init__(dtype, (count,))
-        self._runtime = impl.get_runtime()
+        self._runtime = _impl.get_runtime()
 
     def __del__(self) -> None:
-        if impl is not None and getattr(self, "_runtime", None) is impl.get_runtime():
+        if _impl is not None and getattr(self, "_runtime", None) is _impl.get_runtime():
             super().__del__()

@@ -4,8 +4,7 @@ Mesa's lavapipe (22.3.6) leaves a loop in a kernel after the first atomic in it:
 fast; devices in hardware and other arches take `splat_kernels`.
 """
 
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.rendering.splat_kernels import Ints, Vectors4, enter, first_pixel, metres_per_pixel, vec4
 
 MOST = 2**28  # pixels in a call: their number is 32-bit

@@ -1,8 +1,11 @@
 """Pictures by Taichi's GGUI; needs Vulkan."""
 
-import numpy as np
-import taichi as ti
+from typing import Any
 
+import numpy as np
+
+from taichi_rts.device.backend import FORK, ti
+from taichi_rts.device.forks import VARIABLE
 from taichi_rts.errors import RenderError
 from taichi_rts.rendering.camera import Camera, box_corners, box_edges
 from taichi_rts.rendering.splatter import checked_arrays
@@ -10,8 +13,13 @@ from taichi_rts.rendering.splatter import checked_arrays
 WAY_OUT = "use --renderer splatter, or install Vulkan: apt-get install libvulkan1 mesa-vulkan-drivers"
 
 
-def open_window(title: str, width: int, height: int, visible: bool) -> ti.ui.Window:
-    """Open a window of GGUI; raises `RenderError` where there is no Vulkan."""
+def open_window(title: str, width: int, height: int, visible: bool) -> Any:
+    """Open a window of GGUI; raises `RenderError` where there is no Vulkan, and with a fork of Taichi that has no GGUI."""
+    if not hasattr(ti, "ui"):
+        raise RenderError(
+            f"{FORK.module} has no GGUI, which windows and --renderer ggui need: use --renderer splatter without --gui, or "
+            f"set {VARIABLE} to taichi or taichi_forge in the environment"
+        )
     try:
         return ti.ui.Window(title, (width, height), vsync=visible, show_window=visible)
     except Exception as error:  # RuntimeError without Vulkan, another type in wheels without GGUI
@@ -20,7 +28,7 @@ def open_window(title: str, width: int, height: int, visible: bool) -> ti.ui.Win
         ) from error
 
 
-def _ggui_camera(camera: Camera, aspect: float, reach: float) -> ti.ui.Camera:
+def _ggui_camera(camera: Camera, aspect: float, reach: float) -> Any:
     """Translate the camera; `reach` [m] is how far it must see."""
     view = ti.ui.Camera()
     view.position(*map(float, camera.eye))

@@ -5,8 +5,8 @@ then every supersample is lit on its own and the average goes from linear light 
 """
 
 import numpy as np
-import taichi as ti
 
+from taichi_rts.device.backend import ti
 from taichi_rts.rendering.splat_kernels import FAR, NOBODY, Ints, Vectors3, Vectors4, metres_per_pixel, vec3, vec4
 
 TURNS = 16  # sampling patterns, one for each pixel of a 4 x 4 tile

@@ -8,7 +8,7 @@ A lens is (pixels per metre at unit depth, 1 if perspective else 0, width / 2, h
 
 from typing import Any
 
-import taichi as ti
+from taichi_rts.device.backend import ti
 
 vec3: Any = ti.types.vector(3, ti.f32)
 vec4: Any = ti.types.vector(4, ti.f32)

@@ -7,9 +7,8 @@ give the same bits on one arch, whatever the threads did.
 from typing import NamedTuple
 
 import numpy as np
-import taichi as ti
 
-from taichi_rts.device.backend import has_vulkan_hardware
+from taichi_rts.device.backend import has_vulkan_hardware, ti
 from taichi_rts.errors import RenderError
 from taichi_rts.rendering import flat_kernels, lighting, shade_kernels, splat_kernels
 from taichi_rts.rendering.buffers import Buffer

@@ -1,23 +1,15 @@
-"""Text with Pillow's embedded font, which is the same on every machine but lacks Greek letters.
+"""Text in DejaVu Sans, which comes with the package (`fonts/`): the same on every machine, and it has Greek letters.
 
-`_b` after a letter is a subscript and Δ is drawn as a triangle; a few other signs are spelled out.
+`_b` after a letter, and before the end of its word, is a subscript.
 """
+
+import functools
+from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
 
 REFERENCE_HEIGHT = 720  # of a picture whose text is 18 pixels high
-_SPELLED = {
-    "λ": "lambda",
-    "ρ": "rho",
-    "²": "^2",
-    "³": "^3",
-    "×": "x",
-    "–": "-",
-    "→": "->",
-    "·": ".",
-    "ε": "eps",
-    "−": "-",
-}
+FONT = Path(__file__).with_name("fonts") / "DejaVuSans.ttf"
 
 
 def font_size(image_height: int) -> int:
@@ -25,52 +17,40 @@ def font_size(image_height: int) -> int:
     return max(round(18 * image_height / REFERENCE_HEIGHT), 7)
 
 
-def _font(size: float):
-    return ImageFont.load_default(size=max(round(size), 5))
+@functools.lru_cache(maxsize=16)
+def _font(size: int) -> ImageFont.FreeTypeFont:
+    # Pillow's own layout: the other one, where it is installed, would place letters differently.
+    return ImageFont.truetype(str(FONT), size, layout_engine=ImageFont.Layout.BASIC)
 
 
 def _runs(text: str, size: int):
-    """Split a text into (piece, size, drop): subscripts are smaller and lower, Δ stands alone."""
-    for sign, spelled in _SPELLED.items():
-        text = text.replace(sign, spelled)
+    """Split a text into (piece, font, drop [pixels]): subscripts are smaller and lower."""
     piece, k = "", 0
     while k < len(text):
-        subscript = text[k] == "_" and k > 0 and text[k - 1] != " " and k + 1 < len(text) and text[k + 1].isalnum()
-        if not subscript and text[k] != "Δ":
-            piece += text[k]
-            k += 1
+        alone = text[k + 1 : k + 2].isalnum() and not text[k + 2 : k + 3].isalnum()  # not so in dam_break_2d
+        if text[k] == "_" and alone and k > 0 and text[k - 1] != " ":
+            if piece:
+                yield piece, _font(max(size, 5)), 0.0
+            yield text[k + 1], _font(max(round(0.72 * size), 5)), 0.34 * size
+            piece, k = "", k + 2
             continue
-        if piece:
-            yield piece, size, 0.0
-            piece = ""
-        yield (text[k + 1], 0.72 * size, 0.34 * size) if subscript else ("Δ", size, 0.0)
-        k += 2 if subscript else 1
+        piece += text[k]
+        k += 1
     if piece:
-        yield piece, size, 0.0
+        yield piece, _font(max(size, 5)), 0.0
 
 
 def text_width(text: str, size: int) -> float:
     """Return the width of a text [pixels]."""
-    return sum(0.74 * run if piece == "Δ" else _font(run).getlength(piece) for piece, run, _ in _runs(text, size))
+    return sum(font.getlength(piece) for piece, font, _ in _runs(text, size))
 
 
 def draw_text(canvas: ImageDraw.ImageDraw, place, text: str, size: int, fill) -> None:
     """Draw a text whose line box of height `size` has its upper left corner at `place`."""
     x, y = place
-    base = y + 0.82 * size
-    for piece, run, drop in _runs(text, size):
-        if piece == "Δ":
-            cap, wide = 0.68 * run, 0.62 * run
-            corners = [
-                (x + 0.05 * run, base),
-                (x + 0.05 * run + wide / 2, base - cap),
-                (x + 0.05 * run + wide, base),
-            ]
-            canvas.line([*corners, corners[0], corners[1]], fill=fill, width=max(round(0.085 * run), 1))
-            x += 0.74 * run
-            continue
-        canvas.text((x, base + drop), piece, font=_font(run), fill=fill, anchor="ls")
-        x += _font(run).getlength(piece)
+    for piece, font, drop in _runs(text, size):
+        canvas.text((x, y + 0.82 * size + drop), piece, font=font, fill=fill, anchor="ls")
+        x += font.getlength(piece)
 
 
 def panel_of(image, box, alpha: int = 225):

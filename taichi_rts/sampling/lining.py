@@ -127,9 +127,9 @@ def _relax(x: np.ndarray, chosen: np.ndarray, sweeps: int) -> np.ndarray:
 
 def _nearest(points: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Index of the nearest of `points`, (M, dim), to each of `x`, (N, dim)."""
-    if x.shape[1] == 2:  # curves have few points, and need no extra package
+    if x.shape[1] == 2:  # curves have few points: less work than the import
         few = np.array_split(x, len(x) * len(points) // 1_000_000 + 1)
         return np.concatenate([((part[:, None] - points) ** 2).sum(axis=2).argmin(axis=1) for part in few])
-    from scipy.spatial import cKDTree  # of the extra `mesh`: only meshes come here
+    from scipy.spatial import cKDTree
 
     return cKDTree(points).query(x)[1]

@@ -74,7 +74,7 @@ def line_walls(scene: Scene) -> tuple[WallLayer, np.ndarray]:
     numbers: dict[str, int] = {wall.face: number for number, wall in enumerate(scene.moving_walls)}
     s = scene.spacing
     depth, volume = calibrate_walls(scene)
-    depths = depth + s * np.arange(scene.wall_planes)
+    depths = plane_depths(scene, depth)
     inner, stretch = [], []
     for low, high in zip(scene.domain.lower, scene.domain.upper, strict=True):
         count = max(1, round((high - low) / s))
@@ -129,14 +129,11 @@ def line_obstacles(scene: Scene, solids: Sequence[Solid]) -> tuple[WallLayer, ..
     layers = []
     for k, solid in enumerate(solids):
         laid = [line_solid(solid, depth, s)]
-        for plane in range(1, scene.wall_planes):
-            laid.append(line_solid(solid, depth + plane * s, s, least=depth + (plane - 0.2) * s))
+        laid += [line_solid(solid, deep, s, least=deep - 0.2 * s) for deep in plane_depths(scene, depth)[1:]]
         x, normals = (np.concatenate(parts) for parts in zip(*laid, strict=True))
         inside = solid.distance(x)
         if scene.wall_planes > 1:
-            lost = (
-                np.linalg.norm(normals, axis=1) < 0.5
-            )  # amid a thin body, where neither side is nearer: either will do
+            lost = np.linalg.norm(normals, axis=1) < 0.5  # amid a thin body neither side is nearer: either will do
             aside = 0.05 * s * np.array([1.0, 0.8, 0.6])[: scene.dim]
             normals[lost] = solid.normals(x[lost] + aside, 0.01 * s)
         probes = x + (0.5 * s - inside)[:, None] * normals
@@ -212,6 +209,15 @@ def plane_sum(scene: Scene) -> Callable[[float], float]:
     steps = scene.spacing * np.arange(-reach, reach + 1)
     lateral2 = sum(g**2 for g in np.meshgrid(*[steps] * (scene.dim - 1)))
     return lambda d: float(kernel.sample(np.sqrt(lateral2 + d * d)).sum())
+
+
+def plane_depths(scene: Scene, depth: float) -> np.ndarray:
+    """Depths [m] of a wall's planes, of which the first lies `depth` [m] deep: those that anything in front can reach.
+
+    What lies deeper than r would have no effect, and no place in the grid's margin.
+    """
+    depths = depth + scene.spacing * np.arange(scene.wall_planes)
+    return depths[depths < scene.support]
 
 
 def planes_sum(scene: Scene) -> Callable[[float], float]:

@@ -1,11 +1,13 @@
-"""Pairs of particles near each other in NumPy: how many a particle has, and whether any are too near."""
+"""Pairs of particles near each other: how many a particle has, and whether any are too near."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 
 import numpy as np
+
+PART = 20_000
+"""Particles whose pairs are found at a time, to save memory: one has some 100 pairs in three dimensions."""
 
 
 def near_pairs(
@@ -14,29 +16,25 @@ def near_pairs(
     """Yield places i in `x`, j in `others`, and squared distances [m^2], (P,) each, of the pairs nearer than `support` [m].
 
     Positions `x` and `others` [m] are (N, dim) and (M, dim); without `others` pairs are within `x`: each then comes twice, and
-    every particle once with itself. Points are sorted into cells of side `support`; each looks through its own and the adjacent
-    cells, one after the other. Images across periodic faces are not looked at.
+    every particle once with itself. Images across periodic faces are not looked at.
     """
-    y = x if others is None else others
-    if not len(x) or not len(y):
+    # Not at the top: most runs need no pairs, and its import takes longer than NumPy's.
+    from scipy.spatial import cKDTree
+
+    one = x.astype(np.float64)
+    two = one if others is None else others.astype(np.float64)
+    if not len(one) or not len(two):
         return
-    lowest = np.minimum(x.min(axis=0), y.min(axis=0))
-    cells = [np.floor((points - lowest) / support).astype(np.int64) + 1 for points in (x, y)]
-    shape = np.maximum(cells[0].max(axis=0), cells[1].max(axis=0)) + 2  # an empty layer around, so that no index wraps
-    strides = np.cumprod(np.concatenate([[1], shape[:0:-1]]))[::-1]
-    keys = [cell @ strides for cell in cells]
-    mine, theirs = (np.argsort(key, kind="stable") for key in keys)
-    wanted, there = keys[0][mine], keys[1][theirs]
-    one, two = x[mine].astype(np.float64), y[theirs].astype(np.float64)
-    for offset in itertools.product((-1, 0, 1), repeat=x.shape[1]):
-        cell = wanted + int(np.dot(offset, strides))
-        first, end = np.searchsorted(there, cell, "left"), np.searchsorted(there, cell, "right")
-        counts = end - first
-        i = np.repeat(np.arange(len(x)), counts)
-        j = np.arange(len(i)) - np.repeat(np.cumsum(counts) - counts, counts) + np.repeat(first, counts)
+    tree = cKDTree(two)
+    for start in range(0, len(one), PART):
+        # A little more than the support, and then those that are nearer by the same arithmetic as everywhere.
+        part = cKDTree(one[start : start + PART]).sparse_distance_matrix(
+            tree, 1.000001 * support, output_type="ndarray"
+        )
+        i, j = part["i"] + start, part["j"]
         distance2 = ((one[i] - two[j]) ** 2).sum(axis=1)
         near = distance2 < support**2
-        yield mine[i[near]], theirs[j[near]], distance2[near]
+        yield i[near], j[near], distance2[near]
 
 
 def mean_neighbours(x: np.ndarray, support: float) -> float:
@@ -47,14 +45,16 @@ def mean_neighbours(x: np.ndarray, support: float) -> float:
 
 def nearest_pair(x: np.ndarray, limit: float) -> tuple[float, int, int] | None:
     """Return distance [m] and places of the two of `x` [m], (N, dim), that are nearest to each other, if below `limit` [m]."""
-    found = None
-    for i, j, distance2 in near_pairs(x, limit):
-        apart = np.flatnonzero(i < j)
-        if len(apart):
-            k = int(apart[np.argmin(distance2[apart])])
-            if found is None or distance2[k] < found[0]:
-                found = float(distance2[k]), int(i[k]), int(j[k])
-    return None if found is None else (float(np.sqrt(found[0])), found[1], found[2])
+    from scipy.spatial import cKDTree  # as above
+
+    if len(x) < 2:
+        return None
+    distances, places = cKDTree(x).query(x, k=2, distance_upper_bound=limit)
+    i = int(np.argmin(distances[:, 1]))
+    if not distances[i, 1] < limit:
+        return None
+    j = int(places[i][places[i] != i][0])  # particles in one place may come before the particle itself
+    return float(distances[i, 1]), min(i, j), max(i, j)
 
 
 def mean_occupancy(x: np.ndarray, side: float) -> float:

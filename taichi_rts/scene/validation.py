@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 import functools
 import re
@@ -147,7 +148,7 @@ def validated(error_type: type[Error]) -> Callable[[T], T]:
 
     def decorate(cls: T) -> T:
         construct = cls.__init__  # type: ignore[misc]
-        fields = cls.__dataclass_fields__  # type: ignore[attr-defined]
+        fields = [field.name for field in dataclasses.fields(cls)]  # type: ignore[arg-type]
 
         @functools.wraps(construct)
         def __init__(self: Any, *args: Any, **kwargs: Any) -> None:

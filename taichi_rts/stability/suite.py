@@ -17,8 +17,8 @@ import taichi_rts as rts
 from taichi_rts.errors import SceneError
 from taichi_rts.files.writing import write_json
 from taichi_rts.scene.scene import Scene
-from taichi_rts.solver.stepping.base import Stepper
-from taichi_rts.solver.stepping.regional import REGIONAL_SOUND as SOUND_DEFAULTS
+from taichi_rts.solver.stepping.base import Setup, Stepper
+from taichi_rts.solver.stepping.steppers import setups
 from taichi_rts.stability.cases import Case
 from taichi_rts.trials.demands import demanded_density
 from taichi_rts.trials.executors import processes
@@ -55,35 +55,13 @@ class Setting:
         return ""
 
 
-REGIONAL_SOUND = {"sound_speed": "regional"}
-INTEGERS: dict[str, Any] = {"steps": "integers", "beta_decay": 0.2}
-"""The paper's levels, within Eq. 1 by a smaller courant."""
+def _setting(kind: Any, setup: Setup) -> Setting:
+    default = setup.courant if setup.courant is not None else kind(**setup.parameters).own_courant
+    changes = {"sound_speed": "regional"} if setup.regional_sound else {}
+    return Setting(setup.name, lambda courant: kind(courant=courant, **setup.parameters), default, changes)
 
 
-SETTINGS: tuple[Setting, ...] = (
-    Setting("serna", lambda c: rts.Uniform(courant=c), rts.Uniform().courant),
-    Setting("euler", lambda c: rts.Uniform(courant=c, integrator="symplectic_euler"), rts.Uniform().courant),
-    Setting("adaptive", lambda c: rts.Uniform(courant=c, adaptive=True), rts.Uniform().courant),
-    Setting("regional", lambda c: rts.Regional(courant=c), rts.Regional().resolved("courant")),
-    Setting("regional_2", lambda c: rts.Regional(courant=c, levels=2, **INTEGERS), 0.2),
-    Setting("regional_3", lambda c: rts.Regional(courant=c, levels=3, **INTEGERS), 0.4 / 3),
-    Setting(
-        "regional_paper",
-        lambda c: rts.Regional(courant=c, preset="paper"),
-        rts.Regional(preset="paper").resolved("courant"),
-    ),
-    Setting("asynchronous", lambda c: rts.Asynchronous(courant=c), rts.Asynchronous().longest_courant),
-    Setting(
-        "asynchronous_integers",
-        lambda c: rts.Asynchronous(courant=c, steps="integers"),
-        rts.Asynchronous().longest_courant,
-    ),
-    Setting("adaptive_c", lambda c: rts.Uniform(courant=c, adaptive=True), rts.Uniform().courant, REGIONAL_SOUND),
-    Setting("regional_c", lambda c: rts.Regional(courant=c), SOUND_DEFAULTS["courant"], REGIONAL_SOUND),
-    Setting(
-        "asynchronous_c", lambda c: rts.Asynchronous(courant=c), rts.Asynchronous().longest_courant, REGIONAL_SOUND
-    ),
-)
+SETTINGS: tuple[Setting, ...] = tuple(_setting(kind, setup) for kind, setup in setups("mapped").values())
 """All steppers, in the order of the map's columns; those that end in "_c" run with the regional sound speed."""
 
 

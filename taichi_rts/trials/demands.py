@@ -38,11 +38,10 @@ def jump_density(mach: float) -> float:
     Rankine-Hugoniot in the fluid's frame, with the shock's speed U: rho_0 U u = p(rho) and rho_0 U = rho (U - u). So
     rho_0 u^2 = p (1 - rho_0/rho), with p = rho_0 c_s^2/7 ((rho/rho_0)^7 - 1).
     """
-    low, high = 1.0, STRONGEST_JUMP
-    while high - low > 1e-12 * high:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if jump_mach(middle) < mach else (low, middle)
-    return high if mach > 0.0 else 1.0
+    from scipy.optimize import brentq  # not at the top: its import takes longer than NumPy's
+
+    wanted = min(mach, jump_mach(STRONGEST_JUMP))
+    return float(brentq(lambda density: jump_mach(density) - wanted, 1.0, STRONGEST_JUMP, xtol=1e-12))
 
 
 def demanded_density(scene: Scene) -> float:

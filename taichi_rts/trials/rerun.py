@@ -11,13 +11,6 @@ from taichi_rts.simulation import Simulation
 from taichi_rts.solver.stepping.base import Stepper
 
 
-class _Unstarted(Simulation):
-    """Has not evaluated anything yet, so that it can still take another courant."""
-
-    def _start(self) -> None:
-        pass
-
-
 class Rerun:
     """Builds the `Simulation` of a scene and a stepper; for the next courant it is set back instead of compiled again.
 
@@ -27,7 +20,7 @@ class Rerun:
 
     def __init__(self, fresh: Callable[[], Any]) -> None:
         self.fresh = fresh
-        self.sim: _Unstarted | None = None
+        self.sim: Simulation | None = None
         self.start: Rewind | None = None
         self.builds = 0
 
@@ -36,13 +29,14 @@ class Rerun:
         sim = self.sim
         if sim is not None and self.start is not None:
             self.start.restore()
-            sim.stepper, sim.timeline = stepper, stepper.timeline(scene)
-            if sim.scene is not scene or not sim.schedule.retime(stepper, sim.timeline):
+            sim.stepper, sim.solver.timeline = stepper, stepper.timeline(scene)
+            if sim.scene is not scene or not sim.schedule.retime(stepper.in_scene(scene), sim.timeline):
                 sim = None
         if sim is None:
             self.fresh()
-            self.sim = sim = _Unstarted(scene, stepper, debug=debug)
+            # It has evaluated nothing yet, so that it can still take another courant.
+            self.sim = sim = Simulation(scene, stepper, debug=debug, started=False)
             self.start = Rewind(sim)
             self.builds += 1
-        Simulation._start(sim)
+        sim.start()
         return sim

@@ -15,6 +15,7 @@ from taichi_rts.rendering.painter import PictureOptions, make_camera
 from taichi_rts.scene.placing import at_origin
 from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
+from taichi_rts.solver.stepping.steppers import STEPPERS
 from taichi_rts.window.session import HISTORY, LiveSession
 from taichi_rts.window.window import LiveWindow
 
@@ -31,9 +32,7 @@ KEY_LINES = (
     "Space   pause, go on",
     ". or n  one base step",
     "r       back to the start",
-    "1 or u  uniform steps",
-    "2 or g  regional steps",
-    "3 or a  asynchronous steps",
+    *(f"{number} or {kind.key}  {name} steps" for number, (name, kind) in enumerate(STEPPERS.items(), 1)),
     "Return  apply the sliders",
     "c       next colours",
     "p       other palette",

@@ -125,8 +125,9 @@ class LiveSession:
     def settings(self) -> Settings:
         """The settings of the present run."""
         stepper: Any = self.sim.stepper
-        longest = getattr(stepper, "longest_courant", None) or stepper.courant
-        return Settings(stepper.name, self.sim.schedule.levels, longest, self.sim.scene.kinematic_viscosity)
+        return Settings(
+            stepper.name, self.sim.schedule.levels, stepper.longest_courant, self.sim.scene.kinematic_viscosity
+        )
 
     @property
     def thickest(self) -> float:
@@ -150,11 +151,11 @@ class LiveSession:
             if getattr(base, "steps", None) == "powers_of_two":
                 levels = 1 << (levels.bit_length() - 1)
             changes["levels"] = levels
+        changed = dataclasses.replace(base, **changes)
         if abs(wanted.courant - present.courant) > 1e-6:
-            divided = wanted.stepper == "regional" and not base.resolved("strict_cfl")
-            count = changes.get("levels", base.resolved("levels")) if divided else 1
-            changes["courant"] = round(wanted.courant / count, 6)
-        return dataclasses.replace(base, **changes)
+            changed = changed.with_longest(wanted.courant)
+            changed = dataclasses.replace(changed, courant=round(changed.courant, 6))
+        return changed
 
     def _by_name(self, name: str) -> Any:
         return self.stepper if self.stepper.name == name else STEPPERS[name]()
@@ -312,8 +313,8 @@ class LiveSession:
         "v": record,
         **{
             key: lambda self, name=name: self.choose_stepper(name)
-            for name, keys in {"uniform": "1u", "regional": "2g", "asynchronous": "3a"}.items()
-            for key in keys
+            for number, (name, kind) in enumerate(STEPPERS.items(), 1)
+            for key in (str(number), *kind.key)
         },
         "Return": apply,
         "h": help,

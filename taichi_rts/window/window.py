@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
+from taichi_rts.device.backend import ti
 from taichi_rts.errors import RenderError
 from taichi_rts.rendering.camera import Camera
 from taichi_rts.rendering.ggui import compose, open_window

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import taichi_rts as rts
+from taichi_rts.solver.stepping import steppers
 
 FALL_VELOCITY = (0.1, -0.5)
 THROW = (1.0, 0.5)
@@ -53,6 +54,8 @@ STEPPERS = {
     "asynchronous": rts.Asynchronous(),
     "asynchronous_integers": rts.Asynchronous(steps="integers", levels=16, stagger=1),
 }
+STEPPERS |= {name: kind() for name, kind in steppers.STEPPERS.items() if kind not in map(type, STEPPERS.values())}
+"""All steppers: those that nothing is said of above at their defaults."""
 
 IN_2D_ONLY = ("uniform_symplectic_euler", "uniform_adaptive", "regional", "asynchronous")
 """Of each kind others run in three dimensions; the defaults do so in tests/validation/test_still_pool.py."""

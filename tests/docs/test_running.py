@@ -10,10 +10,10 @@ import sys
 
 import checking
 import pytest
-import taichi as ti
 from documents import PAGES, ROOT, blocks, commands, commands_of, name, scene_files
 
 from taichi_rts.commands.main import main
+from taichi_rts.device.backend import ti
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_environment")]
 

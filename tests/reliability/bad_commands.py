@@ -161,7 +161,6 @@ COMMANDS = [
         "pysplashsurf", "surface", ("run", "dam_break", "--arch", "cpu", "--output-dir", "out", "--export", "surface")
     ),
     missing("trimesh", "mesh", RUN, scene=NEW_MESH),
-    missing("scipy", "mesh", RUN, scene=NEW_MESH),
     missing("matplotlib", "plots", ("compare", "--output-dir", "out")),
     missing("matplotlib", "plots", ("stability", "--output-dir", "out")),
     missing("distributed", "cluster", ("compare", "--output-dir", "out", "--no-plot", "--dask", "local")),

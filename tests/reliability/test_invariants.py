@@ -2,9 +2,9 @@
 
 import pytest
 import stored_invariants as stored
-import taichi as ti
 
 import taichi_rts as rts
+from taichi_rts.device.backend import ti
 from taichi_rts.medium import smoothing
 
 QUICK = ("dam_break_2d asynchronous",)

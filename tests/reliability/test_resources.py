@@ -3,12 +3,10 @@
 import math
 
 import pytest
-import taichi as ti
-from taichi.lang.util import cook_dtype
 
 import taichi_rts as rts
 from taichi_rts.assembly import resources
-from taichi_rts.device.backend import Backend
+from taichi_rts.device.backend import Backend, ti
 from taichi_rts.sampling.sampling import sample
 from taichi_rts.scene.checks.size import MOST, finest_spacing, size_of
 
@@ -24,7 +22,7 @@ def allocated(monkeypatch):
         def counted(*args, **options):
             dtype, shape = args[entries], args[entries + 1]
             count = math.prod(shape) if isinstance(shape, tuple) else shape
-            bytes_each = 8 if cook_dtype(dtype) in (ti.f64, ti.i64) else 4
+            bytes_each = 8 if ti.lang.util.cook_dtype(dtype) in (ti.f64, ti.i64) else 4
             found.append(count * bytes_each * math.prod(args[:entries]))
             with monkeypatch.context() as patch:  # a vector is made as a matrix
                 patch.setattr(ti.Matrix, "field", originals["matrix"])

@@ -13,7 +13,7 @@ assert "site-packages" in taichi_rts.__file__, taichi_rts.__file__
 names = [each.name for each in pkgutil.walk_packages(taichi_rts.__path__, "taichi_rts.") if "__main__" not in each.name]
 for name in names:
     importlib.import_module(name)
-packages = ("imageio_ffmpeg", "matplotlib", "distributed", "h5py", "pysplashsurf", "trimesh", "scipy", "Xlib")
+packages = ("imageio_ffmpeg", "matplotlib", "distributed", "h5py", "pysplashsurf", "trimesh", "Xlib")
 extras = [each for each in packages if importlib.util.find_spec(each)]
 print(len(names), len(taichi_rts.scene_names()), *extras)
 """

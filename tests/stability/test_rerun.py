@@ -34,4 +34,4 @@ def test_another_number_of_ticks_needs_other_kernels(start_taichi, quick):
         sim = rerun._Unstarted(scene, rts.Asynchronous(courant=0.4))
         for courant, serves in ((0.39, True), (0.1, False)):
             stepper = rts.Asynchronous(courant=courant)
-            assert sim.schedule.retime(stepper, stepper.timeline(scene)) == serves
+            assert sim.schedule.retime(stepper.in_scene(scene), stepper.timeline(scene)) == serves

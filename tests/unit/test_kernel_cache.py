@@ -8,7 +8,7 @@ from programs import run, run_program
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="HOME means nothing there")
 CODE = """
-import taichi as ti
+from taichi_rts.device.backend import ti
 rts.init("cpu")
 field = ti.field(ti.f32, 4)
 field.fill(1.5)  # a kernel, which Taichi writes to its cache when the process ends

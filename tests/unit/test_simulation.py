@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.simulation import REORDER_EVERY
+from taichi_rts.solver.solver import REORDER_EVERY
 
 FALLING = rts.Block((0.2, 0.2), (0.4, 0.6), velocity=(1, -2))
 SMALL = rts.Scene(domain=rts.Box((0, 0), (1, 1)), fluids=[FALLING], spacing=0.04)

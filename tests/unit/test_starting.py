@@ -39,7 +39,8 @@ print(sim.time, float(sim.positions().max()) > 0.4)
 def test_a_simulation_of_before_another_init_says_so_whatever_it_is_asked(tmp_path, again):
     said = output(
         f"""
-import taichi as ti, inspect
+import inspect
+ti = rts.ti
 rts.init("cpu")
 sim = build()
 {again}
@@ -65,7 +66,7 @@ for call in calls:
 def test_fields_of_a_user_are_not_destroyed(tmp_path):
     said = output(
         """
-import taichi as ti
+ti = rts.ti
 ti.init(ti.cpu, default_fp=ti.f64, log_level=ti.ERROR)
 own, array = ti.field(ti.f32, 4), ti.ndarray(ti.f32, 3)
 own.fill(3.0)
@@ -109,7 +110,7 @@ print(own[2], sim.positions().shape)
 def test_whatever_a_user_has_made_counts(tmp_path, what):
     said = output(
         f"""
-import taichi as ti
+ti = rts.ti
 ti.init(ti.cpu)
 rts.init("cpu")  # nothing would be lost
 ti.init(ti.cpu)
@@ -137,7 +138,7 @@ def test_nothing_to_reuse(tmp_path):
 def test_own_fields_after_init_keep_working(tmp_path):
     said = output(
         """
-import taichi as ti
+ti = rts.ti
 rts.init("cpu")
 before = ti.field(ti.f32, 4)
 before.fill(1.0)

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-import taichi as ti
 
 import taichi_rts as rts
 from taichi_rts.assembly.inventory import parts
 from taichi_rts.device import backend
+from taichi_rts.device.backend import ti
 from taichi_rts.device.counters import Counters
 from taichi_rts.scene.geometry.bodies import bodies
 from taichi_rts.solver.physics.momentum import Gravity

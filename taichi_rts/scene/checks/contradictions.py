@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,7 @@ from taichi_rts.scene.parts.conditions import AXES, face_axis, face_position
 from taichi_rts.scene.parts.particles import LEAST_DISTANCE, Particles
 from taichi_rts.scene.parts.probes import names
 from taichi_rts.scene.parts.shapes import Block, Sphere, separation
-
-if TYPE_CHECKING:
-    from taichi_rts.scene.scene import Scene
+from taichi_rts.scene.scales import SceneScales
 
 MOST_CROWDED = 2.0
 """Particles given one by one may have this many times the lattice's number density on average: compressed water has 1.1."""
@@ -31,7 +29,7 @@ SINGLE = 1e-6
 """Share of the domain's size by which they may lie outside of it, as single precision rounds."""
 
 
-def contradictions(scene: Scene) -> list[str]:
+def contradictions(scene: SceneScales) -> list[str]:
     """Find what is wrong between fields that are each valid."""
     faults = size_faults(scene)
     if faults:
@@ -57,12 +55,12 @@ def contradictions(scene: Scene) -> list[str]:
     return faults or range_faults(scene)
 
 
-def _guesses_speed(scene: Scene) -> bool:
+def _guesses_speed(scene: SceneScales) -> bool:
     """Whether the sound speed follows from an estimate of the largest speed."""
     return not isinstance(scene.sound_speed, (int, float))
 
 
-def _support_faults(scene: Scene) -> list[str]:
+def _support_faults(scene: SceneScales) -> list[str]:
     """Find a support that the walls cannot hold water at rest with."""
     walled = scene.walls and not all(scene.is_periodic)
     if (
@@ -78,7 +76,7 @@ def _support_faults(scene: Scene) -> list[str]:
     return []
 
 
-def _sound_faults(scene: Scene) -> list[str]:
+def _sound_faults(scene: SceneScales) -> list[str]:
     """Find what a regional sound speed does not go with."""
     regional = scene.regional_sound
     if regional is None:
@@ -97,7 +95,7 @@ def _sound_faults(scene: Scene) -> list[str]:
     return faults
 
 
-def _body_force_faults(scene: Scene) -> list[str]:
+def _body_force_faults(scene: SceneScales) -> list[str]:
     force = scene.body_force
     if force is None:
         return []
@@ -117,7 +115,7 @@ def _body_force_faults(scene: Scene) -> list[str]:
     return faults
 
 
-def _condition_faults(scene: Scene) -> list[str]:
+def _condition_faults(scene: SceneScales) -> list[str]:
     """Find what is wrong with periodic axes, moving walls, inflows and changes of gravity."""
     faults = [
         f"periodic: axis {axis!r} does not exist in two dimensions"
@@ -175,7 +173,7 @@ def _condition_faults(scene: Scene) -> list[str]:
     return faults
 
 
-def _outlet_faults(scene: Scene) -> list[str]:
+def _outlet_faults(scene: SceneScales) -> list[str]:
     """Find outlets that lie outside the domain, are so thin that fluid may cross them, or take what an inflow lets in."""
     faults = []
     for k, outlet in enumerate(scene.outlets):
@@ -198,7 +196,7 @@ def _outlet_faults(scene: Scene) -> list[str]:
     return faults
 
 
-def _place_faults(scene: Scene, kind: str) -> list[str]:
+def _place_faults(scene: SceneScales, kind: str) -> list[str]:
     """Find what is wrong with the scene's `kind`, probes or gauges."""
     faults = []
     places: Any = getattr(scene, kind)
@@ -214,7 +212,7 @@ def _place_faults(scene: Scene, kind: str) -> list[str]:
     return faults
 
 
-def _particle_faults(scene: Scene) -> list[str]:
+def _particle_faults(scene: SceneScales) -> list[str]:
     """Find particles that are too near to each other, or were made with a smaller spacing."""
     given = {k: fluid for k, fluid in enumerate(scene.fluids) if isinstance(fluid, Particles)}
     faults = []
@@ -245,7 +243,7 @@ def _particle_faults(scene: Scene) -> list[str]:
     return faults
 
 
-def _fluid_faults(scene: Scene, k: int, fluid: Block | Sphere | Particles) -> list[str]:
+def _fluid_faults(scene: SceneScales, k: int, fluid: Block | Sphere | Particles) -> list[str]:
     faults = []
     slack = SINGLE * max(scene.domain.size) if isinstance(fluid, Particles) else _slack(scene)
     low = all(a >= b - slack for a, b in zip(fluid.lower, scene.domain.lower, strict=True))
@@ -266,7 +264,7 @@ def _fluid_faults(scene: Scene, k: int, fluid: Block | Sphere | Particles) -> li
     return faults
 
 
-def _pair_faults(scene: Scene, k: int, other: int) -> list[str]:
+def _pair_faults(scene: SceneScales, k: int, other: int) -> list[str]:
     one, two = scene.fluids[k], scene.fluids[other]
     gap = separation(one, two)
     slack = _slack(scene)
@@ -282,6 +280,6 @@ def _pair_faults(scene: Scene, k: int, other: int) -> list[str]:
     return []
 
 
-def _slack(scene: Scene) -> float:
+def _slack(scene: SceneScales) -> float:
     corners = (*scene.domain.lower, *scene.domain.upper)
     return 1e-9 * max(scene.domain.size) + 4.0 * math.ulp(max(map(abs, corners)))  # for lengths [m] that rounding blurs

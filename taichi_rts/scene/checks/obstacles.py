@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -10,15 +10,13 @@ from taichi_rts.errors import SceneError
 from taichi_rts.scene.geometry.drowned import is_drowned
 from taichi_rts.scene.geometry.making import make_solid
 from taichi_rts.scene.geometry.solid import Solid
-
-if TYPE_CHECKING:
-    from taichi_rts.scene.scene import Scene
+from taichi_rts.scene.scales import SceneScales
 
 FAR_LARGER = 20.0
 """Extent of an obstacle over the domain's from which its file must be in another unit."""
 
 
-def obstacle_faults(scene: Scene) -> list[str]:
+def obstacle_faults(scene: SceneScales) -> list[str]:
     """Find what is wrong with each obstacle, and fluids that lie wholly in one."""
     faults: list[str] = []
     solids = []
@@ -36,7 +34,7 @@ def obstacle_faults(scene: Scene) -> list[str]:
     return faults or _drowned_faults(scene, solids)
 
 
-def _dimension_faults(scene: Scene, obstacle: Any) -> list[str]:
+def _dimension_faults(scene: SceneScales, obstacle: Any) -> list[str]:
     """Find vectors that have not the scene's number of components."""
     dim = scene.dim
     if obstacle.dim != dim:
@@ -54,7 +52,7 @@ def _dimension_faults(scene: Scene, obstacle: Any) -> list[str]:
     ]
 
 
-def _place_faults(scene: Scene, obstacle: Any, solid: Solid) -> list[str]:
+def _place_faults(scene: SceneScales, obstacle: Any, solid: Solid) -> list[str]:
     """Find an obstacle of the wrong size or outside the domain."""
     low, high = np.array(scene.domain.lower), np.array(scene.domain.upper)
     size = float((solid.upper - solid.lower).max())
@@ -78,7 +76,7 @@ def _place_faults(scene: Scene, obstacle: Any, solid: Solid) -> list[str]:
     return []
 
 
-def _drowned_faults(scene: Scene, solids: list[tuple[int, Solid]]) -> list[str]:
+def _drowned_faults(scene: SceneScales, solids: list[tuple[int, Solid]]) -> list[str]:
     """Find fluids of which nothing is left outside the obstacles."""
     return [
         f"fluids.{n}: lies wholly inside obstacles.{k}; move or shrink one of them"

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from taichi_rts.scene.parts.shapes import corners, top_speed
-
-if TYPE_CHECKING:
-    from taichi_rts.scene.scene import Scene
+from taichi_rts.scene.scales import SceneScales
 
 MOST_MACH = 2.0
 """Largest Mach number at which a scene may be set up: that of the speed at which a run counts as blown up."""
@@ -26,7 +23,7 @@ FINEST = 1e-8
 """Smallest spacing [m]: the slope of a kernel, 1/r^4, still fits into single precision."""
 
 
-def range_faults(scene: Scene) -> list[str]:
+def range_faults(scene: SceneScales) -> list[str]:
     """Find what is out of range. Only to be asked of a scene in which nothing else is wrong."""
     if scene.spacing < FINEST:
         return [f"spacing: {scene.spacing:g} is below {FINEST:g} m, where single precision ends; use a larger one"]
@@ -69,13 +66,13 @@ def range_faults(scene: Scene) -> list[str]:
     return faults
 
 
-def _certain_speed(scene: Scene) -> float:
+def _certain_speed(scene: SceneScales) -> float:
     """Largest speed [m/s] that the scene sets, or that fluid reaches by falling; on periodic axes friction may stop a fall."""
     given = [top_speed(fluid) for fluid in scene.fluids] + [math.hypot(*inflow.velocity) for inflow in scene.inflows]
     return max(scene.wall_speed, *given) if any(scene.is_periodic) else scene.estimate_max_speed()
 
 
-def _accelerations(scene: Scene) -> list[tuple[str, float]]:
+def _accelerations(scene: SceneScales) -> list[tuple[str, float]]:
     """Names and sizes [m/s^2] of what accelerates all fluid."""
     found = [("gravity", math.hypot(*scene.acceleration))]
     found += [(f"gravity_changes.{k}", math.hypot(*change.gravity)) for k, change in enumerate(scene.gravity_changes)]

@@ -6,13 +6,11 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.scene.parts.particles import Particles
-
-if TYPE_CHECKING:
-    from taichi_rts.scene.scene import Scene
+from taichi_rts.scene.scales import SceneScales
 
 MOST = 2**31 - 1
 """Particles and cells of the grid are counted with 32 bits on the device."""
@@ -31,7 +29,7 @@ class SceneSize:
     blocks: float
 
 
-def size_of(scene: Scene, spacing: float | None = None) -> SceneSize:
+def size_of(scene: SceneScales, spacing: float | None = None) -> SceneSize:
     """Return the size of `scene`, or the one that it would have with another `spacing` [m]."""
     s = scene.spacing if spacing is None else spacing
     given = sum(fluid.count for fluid in scene.fluids if isinstance(fluid, Particles))
@@ -51,7 +49,7 @@ def size_of(scene: Scene, spacing: float | None = None) -> SceneSize:
     )
 
 
-def _flowing_in(scene: Scene, inflow: Any, spacing: float) -> float:
+def _flowing_in(scene: SceneScales, inflow: Any, spacing: float) -> float:
     patch = math.prod(
         (b - a) / spacing for d, (a, b) in enumerate(zip(inflow.lower, inflow.upper, strict=True)) if d != inflow.axis
     )
@@ -73,7 +71,7 @@ def finest_spacing(fits: Callable[[float], bool], spacing: float) -> float:
     return float(f"{math.ceil(above / digit) * digit:.2g}")
 
 
-def size_faults(scene: Scene) -> list[str]:
+def size_faults(scene: SceneScales) -> list[str]:
     """Find counts that do not fit into 32 bits."""
 
     def counts(spacing: float) -> dict[str, float]:
@@ -99,7 +97,7 @@ HUGE = 300.0
 """Extent [m] from which a domain looks as if its numbers were millimetres."""
 
 
-def warn_of_size(scene: Scene) -> None:
+def warn_of_size(scene: SceneScales) -> None:
     """Warn of a domain that was perhaps drawn in millimetres: nothing else says so, as all of a run follows from its lengths."""
     extent = max(scene.domain.size)
     if extent >= HUGE and any(scene.acceleration):

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from taichi_rts.scene.fields import SceneFields
 from taichi_rts.scene.geometry.making import make_solid
 from taichi_rts.scene.geometry.solid import Solid
 from taichi_rts.scene.parts.obstacles import Pieces
-
-if TYPE_CHECKING:
-    from taichi_rts.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -52,7 +49,7 @@ class Body:
         return self.pivot + (x - self.pivot - shift) @ turn
 
 
-def bodies(scene: Scene) -> list[Body]:
+def bodies(scene: SceneFields) -> list[Body]:
     """List the moving obstacles of a scene."""
     found = []
     periods = tuple(size if around else 0.0 for size, around in zip(scene.domain.size, scene.is_periodic, strict=True))

@@ -26,7 +26,6 @@ def load_mesh(obstacle: MeshObstacle) -> Any:
     if not path.is_file():
         raise SceneError(f"mesh file {obstacle.file!r} does not exist; check the path")
     try:
-        import scipy  # noqa: F401
         import trimesh
     except ImportError as error:
         raise SceneError(

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_rts.scene.scene import Scene
+from taichi_rts.scene.fields import SceneFields
 
 
-def periods(scene: Scene) -> np.ndarray:
+def periods(scene: SceneFields) -> np.ndarray:
     """Lengths of the periodic axes [m], infinity for others, (dim,)."""
     lengths = zip(scene.domain.size, scene.is_periodic, strict=True)
     return np.asarray([length if periodic else np.inf for length, periodic in lengths])

@@ -339,11 +339,7 @@ def _turn_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Rotation [rad] that leads from the rotation `a` to `b`, both like the argument of `rotation_matrix`."""
     if len(a) == 1 or np.linalg.norm(np.cross(a, b)) < 1e-12:
         return b - a
-    matrix = rotation_matrix(b) @ rotation_matrix(a).T
-    axis = np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
-    sine = 0.5 * float(np.linalg.norm(axis))
-    angle = float(np.arctan2(sine, 0.5 * (np.trace(matrix) - 1.0)))
-    if sine < 1e-9:  # nothing, or half a turn, whose axis is any column of M + 1
-        columns = matrix + np.eye(3)
-        axis = columns[:, int(np.argmax(np.linalg.norm(columns, axis=0)))] if angle > 1.0 else np.ones(3)
-    return angle * axis / np.linalg.norm(axis)
+    # Not at the top: few scenes come here, and its import takes longer than NumPy's.
+    from scipy.spatial.transform import Rotation
+
+    return (Rotation.from_rotvec(b) * Rotation.from_rotvec(a).inv()).as_rotvec()

@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import taichi as ti
 
+from taichi_rts.device.backend import ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 
 MARGIN = 1  # blocks around the domain, so that no neighbour index leaves the grid; wall particles lie there

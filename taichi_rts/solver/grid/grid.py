@@ -5,9 +5,8 @@ fastest make the neighbours of a particle in one row one contiguous range, and f
 """
 
 import numpy as np
-import taichi as ti
 
-from taichi_rts.device.backend import on_cpu
+from taichi_rts.device.backend import on_cpu, ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.device.scan import ExclusiveScan
 from taichi_rts.solver.grid.geometry import Geometry

@@ -3,9 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import taichi as ti
-
-from taichi_rts.device.backend import CHUNK, Backend
+from taichi_rts.device.backend import CHUNK, Backend, ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.grid.sums import make_neighbour_sum, make_wall_sum

@@ -3,9 +3,7 @@
 import math
 from typing import Any
 
-import taichi as ti
-
-from taichi_rts.device.backend import CHUNK, threads
+from taichi_rts.device.backend import CHUNK, threads, ti
 
 FEW = 8
 """Only if fewer than one of so many particles have changed their cell there is a list of them; else all are sorted anew."""

@@ -1,8 +1,6 @@
 """What lies in the blocks around every occupied block, reduced: the smallest step beside it, the largest sound speed."""
 
-import taichi as ti
-
-from taichi_rts.device.backend import CHUNK, threads
+from taichi_rts.device.backend import CHUNK, threads, ti
 from taichi_rts.solver.grid.grid import BlockGrid
 
 TASKS = 4  # shares of the occupied blocks for each thread; they are taken one by one

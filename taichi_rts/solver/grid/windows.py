@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
-from taichi_rts.device.backend import Backend, threads
+from taichi_rts.device.backend import Backend, threads, ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.solver.grid.geometry import MARGIN, Geometry
 from taichi_rts.solver.grid.grid import BlockGrid

@@ -1,6 +1,6 @@
 """The predictor-corrector of Serna, Dominguez-Tenreiro & Saiz 2003, as used by Goswami & Batty 2014, Eq. 4-7."""
 
-import taichi as ti
+from taichi_rts.device.backend import ti
 
 
 @ti.data_oriented

@@ -1,6 +1,6 @@
 """Symplectic Euler, kick then drift, for one step for all."""
 
-import taichi as ti
+from taichi_rts.device.backend import ti
 
 
 @ti.data_oriented

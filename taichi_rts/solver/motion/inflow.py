@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-import taichi as ti
 
+from taichi_rts.device.backend import ti
 from taichi_rts.sampling.sampling import fill_patch
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.particles.particles import Particles

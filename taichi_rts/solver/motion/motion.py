@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.device.counters import Counters
 from taichi_rts.medium.medium import Medium
 from taichi_rts.solver.grid.grid import BlockGrid

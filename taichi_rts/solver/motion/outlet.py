@@ -1,8 +1,8 @@
 """Fluid that flows out: what has come into an outlet's box is taken out of the particles' fields."""
 
 import numpy as np
-import taichi as ti
 
+from taichi_rts.device.backend import ti
 from taichi_rts.device.scan import ExclusiveScan
 from taichi_rts.medium.energy import potential_of
 from taichi_rts.scene.scene import Scene

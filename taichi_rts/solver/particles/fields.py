@@ -2,7 +2,7 @@
 
 from typing import Any
 
-import taichi as ti
+from taichi_rts.device.backend import ti
 
 Values: Any = ti.types.ndarray(ndim=1)
 Rows: Any = ti.types.ndarray(ndim=2)

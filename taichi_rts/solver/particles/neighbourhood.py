@@ -3,9 +3,7 @@
 from collections.abc import Set
 from typing import Any
 
-import taichi as ti
-
-from taichi_rts.device.backend import Backend
+from taichi_rts.device.backend import Backend, ti
 from taichi_rts.solver.particles.fields import components, vector_field
 
 

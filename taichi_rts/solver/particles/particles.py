@@ -9,9 +9,8 @@ from collections.abc import Set
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
-from taichi_rts.device.backend import Backend
+from taichi_rts.device.backend import Backend, ti
 from taichi_rts.solver.particles.fields import Rows, Values, batches, components, vector_field
 
 

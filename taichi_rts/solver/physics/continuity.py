@@ -3,8 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.medium.medium import Medium
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood

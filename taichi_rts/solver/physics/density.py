@@ -3,9 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-import taichi as ti
-
-from taichi_rts.device.backend import Backend
+from taichi_rts.device.backend import Backend, ti
 from taichi_rts.medium.medium import Medium
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.grid.neighbour_sum import NeighbourSum

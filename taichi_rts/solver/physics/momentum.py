@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
-from taichi_rts.device.backend import Backend
+from taichi_rts.device.backend import Backend, ti
 from taichi_rts.medium.medium import Medium
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid

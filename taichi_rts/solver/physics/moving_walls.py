@@ -1,9 +1,8 @@
 """Faces of the domain that move as the scene prescribes: pistons."""
 
 import numpy as np
-import taichi as ti
 
-from taichi_rts.device.backend import Backend
+from taichi_rts.device.backend import Backend, ti
 from taichi_rts.sampling.walls import WallLayer
 from taichi_rts.scene.parts.conditions import MovingWall, face_axis
 from taichi_rts.solver.grid.geometry import Geometry

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-import taichi as ti
 
+from taichi_rts.device.backend import ti
 from taichi_rts.scene.geometry.bodies import Body
 from taichi_rts.solver.physics.timetable import Timetable, Wheel, store
 

@@ -7,7 +7,8 @@ moments are kept as a whole number of ticks and a remainder, and only what has p
 from typing import Any
 
 import numpy as np
-import taichi as ti
+
+from taichi_rts.device.backend import ti
 
 LAST = 2**31 - 1
 """Tick of all moments that no run reaches."""

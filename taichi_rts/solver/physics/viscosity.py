@@ -5,8 +5,7 @@ They leave out their common denominator, (rho_i + rho_j) (|x_ij|^2 + 0.01 h^2): 
 
 from typing import Any
 
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.medium.medium import Medium
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood

@@ -12,9 +12,8 @@ import copy
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
-from taichi_rts.device.backend import Backend
+from taichi_rts.device.backend import Backend, ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.sampling.walls import WallLayer
 from taichi_rts.solver.grid.geometry import Geometry
@@ -22,6 +21,9 @@ from taichi_rts.solver.particles.fields import Rows, Values, vector_field
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
 
 LARGEST_SHEAR = 4.0
+LARGEST_SHEAR_LAYERED = 6.0
+"""Where walls have several planes: the first may lie 2.2 spacings deep (r = 4s), and fluid at rest on the face half a spacing from
+it must still count as it is."""
 
 
 @ti.data_oriented
@@ -110,13 +112,13 @@ class Walls:
 
         With (d_i + d_b)/d_i, d_i and d_b being the distances to the face, velocities go through zero on the face (Morris, Fox &
         Zhu 1997, Eq. 23), and a linear profile along a resting lattice feels no force, as it should. Bounded, because fluid
-        may come arbitrarily close: no nearer than d_b/3 counts, d_b being that of the plane next to the face. And at least
-        once: a particle of an obstacle that faces away, round an edge or on a plate's other side, has the obstacle's speed.
+        may come arbitrarily close: no nearer than d_b/3 counts (d_b/5 with several planes, d_b being that of the first). And at
+        least once: a particle of an obstacle that faces away, round an edge or on a plate's other side, has the obstacle's speed.
         """
         distance = self.facing(k, b).dot(x_ib)
         depth, largest = self.depth, LARGEST_SHEAR
         if ti.static(self.layered):
             depth = self.depths[b]
-            largest = 1.0 + (LARGEST_SHEAR - 1.0) / self.depth * depth
+            largest = 1.0 + (LARGEST_SHEAR_LAYERED - 1.0) / self.depth * depth
         ratio = ti.min(distance / ti.max(distance - depth, 1e-3 * depth), largest)
         return ti.max(ratio, 1.0) / self.stiffness

@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
+from taichi_rts.device.backend import ti
 from taichi_rts.medium.equation_of_state import Tait, tait
 from taichi_rts.solver.particles.particles import Particles
 from taichi_rts.solver.sound.rule import SoundRule

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.medium.equation_of_state import tait
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid

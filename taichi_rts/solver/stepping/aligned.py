@@ -1,19 +1,14 @@
 """Aligned blocks: steps end at multiples of themselves, so that blocks of one level are due together, and as a whole."""
 
-from typing import TYPE_CHECKING
-
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.particles.particles import Particles
 from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.limiter import EMPTY
 from taichi_rts.solver.stepping.regions import RegionalSchedule
+from taichi_rts.solver.stepping.settled import SettledRegions
 from taichi_rts.solver.stepping.timeline import Timeline
-
-if TYPE_CHECKING:
-    from taichi_rts.solver.stepping.regional import Regional
 
 MOST_HELD = 1 << 30
 """Particles times steps at which a block hands over what it has counted by itself; a pass adds less than that again."""
@@ -32,8 +27,8 @@ class AlignedBlocks(RegionalSchedule):
     aligned = True
     levels_double = True
 
-    def __init__(self, stepper: "Regional", scene: Scene, particles: Particles, grid: BlockGrid) -> None:
-        super().__init__(stepper, scene, particles, grid)
+    def __init__(self, settled: SettledRegions, scene: Scene, particles: Particles, grid: BlockGrid) -> None:
+        super().__init__(settled, scene, particles, grid)
         grid.track_arrivals()
         self.until_next, self.ends = (ti.field(ti.i32, ()) for _ in range(2))
         """Ticks to the next step, and whether aligned steps of n ticks end now, in bit n - 1."""

@@ -23,18 +23,18 @@ from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.integrators.serna import Serna
 from taichi_rts.solver.particles.particles import Particles
 from taichi_rts.solver.stepping import criteria
-from taichi_rts.solver.stepping.base import Courant, Schedule
+from taichi_rts.solver.stepping.base import ONE_STEP_COURANT, Courant, Schedule, Setup, Stepper
 from taichi_rts.solver.stepping.passes import AsynchronousSchedule
+from taichi_rts.solver.stepping.settled import SettledCells
 from taichi_rts.solver.stepping.timeline import Timeline
 
-LARGEST_COURANT = 0.4  # as for `Uniform` and `Regional`
 DRIFT = 0.05
 """How far a particle may move over the support radius between two sorts: a little more than the longest step at Mach 0.1."""
 
 
 @validated(StepperError)
 @dataclass(frozen=True, config=FROZEN)
-class Asynchronous:
+class Asynchronous(Stepper):
     """Every cell (a block of the grid) has its own time and its own step.
 
     Attributes:
@@ -60,11 +60,19 @@ class Asynchronous:
     stagger: Annotated[int, Field(ge=0, lt=2**31)] | None = None
 
     name: ClassVar[str] = "asynchronous"
+    key: ClassVar[str] = "a"
+    block_integers: ClassVar[int] = 8
+    compared: ClassVar[tuple[Setup, ...]] = (Setup("asynchronous"), Setup("asynchronous-c", regional_sound=True))
+    mapped: ClassVar[tuple[Setup, ...]] = (
+        Setup("asynchronous"),
+        Setup("asynchronous_integers", {"steps": "integers"}),
+        Setup("asynchronous_c", regional_sound=True),
+    )
 
     @property
     def longest_courant(self) -> float:
         """Courant number of the longest step: as given, or that of `Uniform`."""
-        return LARGEST_COURANT if self.courant is None else self.courant
+        return ONE_STEP_COURANT if self.courant is None else self.courant
 
     @model_validator(mode="after")
     def _check(self) -> "Asynchronous":
@@ -95,6 +103,15 @@ class Asynchronous:
         """With all steps equal there is nothing to follow."""
         return self.levels > 1
 
+    @property
+    def own_courant(self) -> float:
+        """As given, or the default."""
+        return self.longest_courant
+
+    def equal_step(self, scene: Scene) -> float:
+        """That of the longest step."""
+        return self._step_courant(scene, self.timeline(scene).tick * self.levels)
+
     def make_integrator(self) -> Any:
         """Return the integrator's object: second order for any sequence of steps, corrected with the time that elapsed."""
         return Serna()
@@ -118,6 +135,18 @@ class Asynchronous:
         """Return a clock that ticks `ticks` times in the longest step."""
         return Timeline(self.longest_step(scene) / self.ticks(scene))
 
+    def in_scene(self, scene: Scene) -> SettledCells:
+        """Return the parameters of steps in `scene`."""
+        return SettledCells(
+            levels=self.ticks(scene),
+            longest_courant=self.longest_courant,
+            lambda_f=self.lambda_f,
+            limiter=self.limiter,
+            powers_of_two=self.steps == "powers_of_two",
+            staggered=self.stagger is not None,
+            seed=self.stagger or 0,
+        )
+
     def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
         """Build the fields and kernels that find the cells that may step."""
-        return AsynchronousSchedule(self, scene, particles, grid, timeline)
+        return AsynchronousSchedule(self.in_scene(scene), scene, particles, grid, timeline)

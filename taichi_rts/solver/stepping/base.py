@@ -2,48 +2,124 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Protocol
+import dataclasses
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-import taichi as ti
 from pydantic import Field
 
+from taichi_rts.device.backend import ti
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
+from taichi_rts.solver.integrators.serna import Serna
 from taichi_rts.solver.particles.particles import Particles
 from taichi_rts.solver.stepping.timeline import Timeline
 
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+ONE_STEP_COURANT = 0.4
+"""Courant number of steps that are the same for all, and of the longest asynchronous ones, at the defaults."""
 Courant = Annotated[float, Field(gt=0, le=2)]
 
 
-class Stepper(Protocol):
-    """A stepper's parameters, and how they become a schedule for one run. To add one, write one file like `uniform.py`."""
+@dataclasses.dataclass(frozen=True)
+class Setup:
+    """A stepper with some `parameters` under a name of its own, as `taichi-rts compare` and `stability` run it.
+
+    Attributes:
+        name: on the command line and in tables.
+        parameters: those that are not the stepper's defaults.
+        courant: its default; None: `own_courant` with these parameters.
+        regional_sound: whether it runs with the regional sound speed.
+        of_longest: whether a comparison's courant is that of the longest step, else the parameter `courant` as it is.
+    """
+
+    name: str
+    parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    courant: float | None = None
+    regional_sound: bool = False
+    of_longest: bool = True
+
+
+class Stepper:
+    """A stepper's parameters, and how they become a schedule for one run. To add one, write one file like `uniform.py`.
+
+    Derive a frozen dataclass from it, with a `name`, a field `courant`, and the methods `timeline` and `schedule`; what else is
+    here has values that serve for steps in which all particles are due. docs/extending.md shows one.
+
+    Attributes:
+        name: on the command line, in files and in messages.
+        key: letter that chooses it in the window, besides its number; empty for none.
+        block_integers: how many fields of 32-bit integers its schedule has with an entry for each block of the grid, at most.
+        compared: what `taichi-rts compare` calls by which names; empty: the stepper alone, by its own.
+        mapped: what the stability map has columns for; empty: the stepper alone, by its own name.
+    """
 
     name: ClassVar[str]
+    key: ClassVar[str] = ""
+    block_integers: ClassVar[int] = 9
+    compared: ClassVar[tuple[Setup, ...]] = ()
+    mapped: ClassVar[tuple[Setup, ...]] = ()
 
     @property
     def follows_sound(self) -> bool:
         """Whether steps follow the sound speed of each region, so that a regional one can pay."""
+        return False
 
     @property
     def extrapolates_density(self) -> bool:
         """Whether the densities of particles that are not due follow d rho/dt, which then has to be computed."""
+        return False
 
     @property
     def keeps_past(self) -> bool:
         """Whether particles may be read at times before their last evaluation, so that the state before it is needed."""
+        return False
 
     @property
     def drift(self) -> float:
         """How far a particle may move, over the support radius, before the grid is sorted anew; 0: every step."""
+        return 0.0
+
+    @property
+    def own_courant(self) -> float:
+        """The parameter `courant`, where it is None its default."""
+        return self.courant  # type: ignore[attr-defined, no-any-return]
+
+    @property
+    def longest_courant(self) -> float:
+        """Courant number of the longest step in water at rest density."""
+        return self.own_courant
+
+    def with_longest(self, courant: float) -> Self:
+        """Return a copy whose longest step is `courant` r/c_s."""
+        return dataclasses.replace(self, courant=courant)  # type: ignore[type-var]
+
+    def equal_step(self, scene: Scene) -> float:
+        """Courant number of the uniform steps that it is compared with at equal step: that of its base step."""
+        return self._step_courant(scene, self.timeline(scene).tick)
+
+    @staticmethod
+    def _step_courant(scene: Scene, step: float) -> float:
+        """Courant number of a `step` [s]; rounded, so that equal steps are equal numbers."""
+        return float(f"{step * scene.wave_speed / scene.support:.10g}")
 
     def make_integrator(self) -> Any:
         """Return the integrator, an object as in `taichi_rts.solver.integrators`."""
+        return Serna()
+
+    def in_scene(self, scene: Scene) -> Any:
+        """Return what the schedule takes of the parameters: all that `scene` decides is decided (`settled.py`)."""
+        return self
 
     def timeline(self, scene: Scene) -> Timeline:
         """Return the clock for `scene`: its tick divides the base step."""
+        raise NotImplementedError
 
     def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
         """Build the fields and kernels that decide who is due."""
+        raise NotImplementedError
 
 
 @ti.data_oriented
@@ -122,8 +198,8 @@ class Schedule:
     def observe(self, now: int, tick: float) -> None:
         """Look at the state after a step, to choose the next."""
 
-    def retime(self, stepper: Any, timeline: Timeline) -> bool:
-        """Take another courant, before the first step: `stepper` has it and else equals the present one.
+    def retime(self, settled: Any, timeline: Timeline) -> bool:
+        """Take another courant, before the first step: `settled` has it (`Stepper.in_scene`) and else equals the present one.
 
         Returns whether the compiled kernels serve for it.
         """

@@ -1,15 +1,10 @@
 """Aligned blocks whose levels follow the regional sound speed (docs/regional_sound_speed.md)."""
 
-from typing import TYPE_CHECKING
-
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.aligned import AlignedBlocks
+from taichi_rts.solver.stepping.settled import SettledRegions
 from taichi_rts.solver.stepping.timeline import Timeline
-
-if TYPE_CHECKING:
-    from taichi_rts.solver.stepping.regional import Regional
 
 
 @ti.data_oriented
@@ -22,9 +17,9 @@ class BlocksBySound(AlignedBlocks):
         """One: sound speeds are graded already; forces are not, but reach no further."""
         return min(1, super().ratio_sweeps())
 
-    def retime(self, stepper: "Regional", timeline: Timeline | None = None) -> bool:
+    def retime(self, settled: SettledRegions, timeline: Timeline | None = None) -> bool:
         """Take another courant."""
-        self.reach = stepper.in_scene(self.scene).resolved("courant") * self.support
+        self.reach = settled.courant * self.support
         return True
 
     @ti.func

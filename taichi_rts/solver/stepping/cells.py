@@ -3,8 +3,7 @@
 The rule is proved in `asynchronous.py`; this file finds the cells that obey it.
 """
 
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.device.counters import Counters
 from taichi_rts.device.scan import ExclusiveScan
 from taichi_rts.solver.grid.grid import BlockGrid

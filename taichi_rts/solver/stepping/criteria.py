@@ -5,8 +5,7 @@ Host functions size the base step and global steps; the ti.funcs answer for one 
 
 import math
 
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.scene.scene import Scene
 
 MACH = 0.1

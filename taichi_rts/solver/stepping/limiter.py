@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-import taichi as ti
+from taichi_rts.device.backend import ti
 
 EMPTY = 1 << 30
 """Level of a block without particles: it limits no other."""

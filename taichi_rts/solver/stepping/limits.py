@@ -2,8 +2,7 @@
 
 import math
 
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.scene.geometry.bodies import bodies
 from taichi_rts.scene.parts.conditions import face_axis, face_position
 from taichi_rts.scene.scene import Scene

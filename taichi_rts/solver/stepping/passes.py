@@ -1,12 +1,12 @@
 """The passes of asynchronous steps: which cells may step now, and how far."""
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-import taichi as ti
 
 from taichi_rts.device import backend
+from taichi_rts.device.backend import ti
 from taichi_rts.device.counters import Counters
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
@@ -15,11 +15,8 @@ from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.cells import Cells
 from taichi_rts.solver.stepping.limiter import NeighbourLimiter
 from taichi_rts.solver.stepping.limits import BlockMaxima
+from taichi_rts.solver.stepping.settled import SettledCells
 from taichi_rts.solver.stepping.timeline import Timeline
-
-if TYPE_CHECKING:
-    from taichi_rts.solver.stepping.asynchronous import Asynchronous
-
 
 LOG = 1 << 14  # passes whose width is kept on the device between two looks
 
@@ -39,15 +36,15 @@ class AsynchronousSchedule(Cells):
     transient = frozenset({"reads_are_slow"})  # of the device
 
     def __init__(
-        self, stepper: "Asynchronous", scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline
+        self, settled: SettledCells, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline
     ) -> None:
-        super().__init__(particles, grid, stepper.ticks(scene))
+        super().__init__(particles, grid, settled.levels)
         self.scene = scene
-        self.retime(stepper, timeline)
+        self.retime(settled, timeline)
         self.maxima = BlockMaxima(scene, particles, grid)
-        self.powers_of_two = stepper.steps == "powers_of_two"
-        self.staggered = stepper.stagger is not None
-        self.seed = stepper.stagger or 0
+        self.powers_of_two = settled.powers_of_two
+        self.staggered = settled.staggered
+        self.seed = settled.seed
         self.limiter = NeighbourLimiter(aligned=self.powers_of_two)
         self.slow_speed = criteria.MACH * scene.least_wave_speed
         self.by_sound = scene.regional_sound is not None
@@ -66,12 +63,12 @@ class AsynchronousSchedule(Cells):
         self.reads_are_slow = backend.current().arch != "cpu"
         self.seen_widths: list[np.ndarray] = []
 
-    def retime(self, stepper: "Asynchronous", timeline: Timeline) -> bool:
+    def retime(self, settled: SettledCells, timeline: Timeline) -> bool:
         """Take another courant; the number of ticks in the longest step is compiled in."""
-        self.stepper = stepper
+        self.settled = settled
         self.tick = timeline.tick
-        self.fast_reach = (1.0 + criteria.MACH) * stepper.longest_courant * self.scene.support  # [m]
-        return stepper.ticks(self.scene) == self.levels
+        self.fast_reach = (1.0 + criteria.MACH) * settled.longest_courant * self.scene.support  # [m]
+        return settled.levels == self.levels
 
     # -- what the host decides: cycles ------------------------------------------------------------------------------
 
@@ -198,7 +195,7 @@ class AsynchronousSchedule(Cells):
                     if step == 0:
                         wanted = 1 + ti.cast(self.noise(block) % ti.cast(wanted, ti.u32), ti.i32)
                 wanted = self.rounded(wanted)
-                if ti.static(self.stepper.limiter):
+                if ti.static(self.settled.limiter):
                     if step > 0:  # the first step has none to grow from
                         wanted = self.rounded(self.limiter.settled(wanted, step, time))
                 step = self.aligned(wanted, time)
@@ -215,7 +212,7 @@ class AsynchronousSchedule(Cells):
         if speed > slow or sound > self.scene.least_wave_speed:
             step = ti.min(step, fast_reach / ((sound + ti.max(speed, slow)) * tick) * (1.0 + 1e-6))
         if acceleration > 0.0:
-            step = ti.min(step, self.stepper.lambda_f * ti.sqrt(self.scene.support / acceleration) / tick)
+            step = ti.min(step, self.settled.lambda_f * ti.sqrt(self.scene.support / acceleration) / tick)
         if viscosity > 0.0:
             step = ti.min(step, self.viscous_reach / (viscosity * tick))
         if step < 1.0:
@@ -257,7 +254,7 @@ class AsynchronousSchedule(Cells):
             block = self.occupied[m]
             if self.block_due[block] > 0:
                 step = self.proposal[block]
-                if ti.static(self.stepper.limiter):
+                if ti.static(self.settled.limiter):
                     shortest = self.shortest_beside(self.proposal, block)
                     step = self.rounded(self.limiter.limited(step, shortest))
                 for n in range(self.due_start[block], self.due_start[block] + self.block_due[block]):
@@ -268,7 +265,7 @@ class AsynchronousSchedule(Cells):
     @ti.kernel
     def wake_neighbours(self, now: ti.i32):
         """Wake cells beside one that has just begun a much shorter step: theirs end early."""
-        if ti.static(self.stepper.limiter):
+        if ti.static(self.settled.limiter):
             for m in range(self.occupied_count[None]):
                 block = self.occupied[m]
                 if self.read_at[block] >= 0:

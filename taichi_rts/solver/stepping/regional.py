@@ -15,11 +15,10 @@ from taichi_rts.solver.integrators.serna import Serna
 from taichi_rts.solver.particles.particles import Particles
 from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.aligned import AlignedBlocks
-from taichi_rts.solver.stepping.base import Courant, Schedule
+from taichi_rts.solver.stepping.base import ONE_STEP_COURANT, Courant, Schedule, Setup, Stepper
 from taichi_rts.solver.stepping.by_sound import BlocksBySound
-from taichi_rts.solver.stepping.regions import lengths
+from taichi_rts.solver.stepping.settled import SettledRegions, lengths
 from taichi_rts.solver.stepping.timeline import Timeline
-from taichi_rts.solver.stepping.uniform import Uniform
 from taichi_rts.solver.stepping.validity import ValidityByParticle
 
 LARGEST_COURANT = 0.6
@@ -53,15 +52,19 @@ REGIONAL_SOUND: dict[str, Any] = {
 At a courant of 0.6 pools are as calm, but one of 1 m stands 1.1 % too low after 2 s, at 0.4 0.8 %.
 """
 FROM_LEVELS: dict[str, Any] = {
-    "courant": lambda levels: LARGEST_COURANT / levels if levels > 1 else Uniform().courant,
+    "courant": lambda levels: LARGEST_COURANT / levels if levels > 1 else ONE_STEP_COURANT,
     "limiter": lambda levels: levels > 2,  # with two levels it changes nothing but the work (docs/asynchronous.md)
     "steps": lambda levels: "half_octaves" if levels in lengths("half_octaves", levels) else "integers",
 }
 
 
+PAPERS: dict[str, Any] = {"steps": "integers", "beta_decay": 0.2}
+"""The paper's levels, within Eq. 1 by a smaller courant."""
+
+
 @validated(StepperError)
 @dataclass(frozen=True, config=FROZEN)
-class Regional:
+class Regional(Stepper):
     """Blocks get steps of n base steps; only due particles recompute density and forces.
 
     Attributes:
@@ -108,8 +111,20 @@ class Regional:
     steps: Literal["integers", "half_octaves", "powers_of_two"] | None = None
 
     name: ClassVar[str] = "regional"
-    keeps_past: ClassVar[bool] = False
-    drift: ClassVar[float] = 0.0
+    key: ClassVar[str] = "g"
+    block_integers: ClassVar[int] = 9
+    compared: ClassVar[tuple[Setup, ...]] = (
+        Setup("regional"),
+        Setup("paper", {"preset": "paper"}, of_longest=False),
+        Setup("regional-c", regional_sound=True),
+    )
+    mapped: ClassVar[tuple[Setup, ...]] = (
+        Setup("regional"),
+        Setup("regional_2", {"levels": 2, **PAPERS}, 0.2),
+        Setup("regional_3", {"levels": 3, **PAPERS}, 0.4 / 3),
+        Setup("regional_paper", {"preset": "paper"}),
+        Setup("regional_c", courant=REGIONAL_SOUND["courant"], regional_sound=True),
+    )
 
     def resolved(self, key: str) -> Any:
         """Return parameter `key`: as given, else from the preset."""
@@ -120,8 +135,27 @@ class Regional:
             return 1.0 if self.longest_courant <= LARGEST_COURANT * (1.0 + 1e-9) else 0.2
         return FROM_LEVELS[key](self.resolved("levels")) if value is None else value
 
-    def in_scene(self, scene: Scene) -> "Regional":
-        """Return a copy in which nothing is None any more; raises `StepperError` if the preset is not for such a scene."""
+    def in_scene(self, scene: Scene) -> SettledRegions:
+        """Return the parameters of steps in `scene`; raises `StepperError` if the preset is not for such a scene."""
+        full = self._filled(scene)
+        levels = full.resolved("levels")
+        decay = full.resolved("beta_decay")
+        return SettledRegions(
+            levels=levels,
+            longest_courant=full.longest_courant,
+            lambda_f=full.resolved("lambda_f"),
+            limiter=full.resolved("limiter"),
+            courant=full.resolved("courant"),
+            strict_cfl=full.resolved("strict_cfl"),
+            aligned=scene.regional_sound is not None or full.resolved("steps") != "integers",
+            lengths=tuple(lengths(full.resolved("steps"), levels)),
+            fractions=tuple(criteria.velocity_fraction(n, self.alpha, self.beta, decay) for n in range(2, levels + 1)),
+            local_sound=self.local_sound,
+            grading=self.grading,
+        )
+
+    def _filled(self, scene: Scene) -> "Regional":
+        """Return a copy in which nothing is None any more."""
         if scene.regional_sound is None:
             keys = ("levels", "courant", "strict_cfl", "lambda_f", "limiter", "steps", "beta_decay")
             settings: dict[str, Any] = {key: self.resolved(key) for key in keys}
@@ -153,20 +187,29 @@ class Regional:
         return Serna(self.corrector)
 
     @property
+    def own_courant(self) -> float:
+        """As given, or the default."""
+        return self.resolved("courant")
+
+    @property
     def longest_courant(self) -> float:
         """Courant number of the longest step in water at rest density."""
         return self.resolved("courant") * (1 if self.resolved("strict_cfl") else self.resolved("levels"))
 
+    def with_longest(self, courant: float) -> "Regional":
+        """Return a copy whose longest step, of all levels, is `courant` r/c_s."""
+        return replace(self, courant=courant / (1 if self.resolved("strict_cfl") else self.resolved("levels")))
+
     def timeline(self, scene: Scene) -> Timeline:
         """Return a clock that ticks once a base step: lambda_v r/c_s, divided by n_max if strict."""
-        full = self.in_scene(scene)
-        step = criteria.acoustic_step(full.resolved("courant"), scene.support, scene.wave_speed)
-        divisor = full.resolved("levels") if full.resolved("strict_cfl") else 1
+        settled = self.in_scene(scene)
+        step = criteria.acoustic_step(settled.courant, scene.support, scene.wave_speed)
+        divisor = settled.levels if settled.strict_cfl else 1
         return Timeline(min(step / divisor, criteria.scene_viscous_step(scene)))
 
     def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
         """Build the schedule of Algorithm 1: by particle as in the paper, of aligned blocks, or by sound speed."""
-        full = self.in_scene(scene)
+        settled = self.in_scene(scene)
         if scene.regional_sound is not None:
-            return BlocksBySound(full, scene, particles, grid)
-        return (ValidityByParticle if full.steps == "integers" else AlignedBlocks)(full, scene, particles, grid)
+            return BlocksBySound(settled, scene, particles, grid)
+        return (AlignedBlocks if settled.aligned else ValidityByParticle)(settled, scene, particles, grid)

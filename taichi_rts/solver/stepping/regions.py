@@ -5,11 +5,8 @@ What all schemes share. When a block or a particle is due is the schemes' own: `
 """
 
 import math
-from typing import TYPE_CHECKING
 
-import taichi as ti
-
-from taichi_rts.device.backend import threads
+from taichi_rts.device.backend import threads, ti
 from taichi_rts.device.counters import Counters
 from taichi_rts.device.scan import ExclusiveScan
 from taichi_rts.scene.scene import Scene
@@ -20,20 +17,8 @@ from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.base import Schedule
 from taichi_rts.solver.stepping.limiter import EMPTY, GrowingSweep, Ladder, NeighbourLimiter, Sweep
 from taichi_rts.solver.stepping.limits import BlockMaxima
+from taichi_rts.solver.stepping.settled import SettledRegions
 from taichi_rts.solver.stepping.timeline import Timeline
-
-if TYPE_CHECKING:
-    from taichi_rts.solver.stepping.regional import Regional
-
-
-def lengths(steps: str, most: int) -> list[int]:
-    """Levels up to `most` that blocks may have."""
-    keep = {
-        "integers": lambda n: True,
-        "powers_of_two": lambda n: n & (n - 1) == 0,
-        "half_octaves": lambda n: n & (n - 1) == 0 or (n % 3 == 0 and (n // 3) & (n // 3 - 1) == 0),
-    }[steps]
-    return [n for n in range(1, most + 1) if keep(n)]
 
 
 @ti.data_oriented
@@ -51,22 +36,19 @@ class RegionalSchedule(Schedule):
     reach_of_regions = 1
     """How much longer than a neighbour's a block's step may be at once: 1 is the paper's R_min."""
 
-    def __init__(self, stepper: "Regional", scene: Scene, particles: Particles, grid: BlockGrid) -> None:
+    def __init__(self, settled: SettledRegions, scene: Scene, particles: Particles, grid: BlockGrid) -> None:
         super().__init__(particles, grid)
         self.scene = scene
-        self.levels = stepper.resolved("levels")
-        self.lambda_f = stepper.resolved("lambda_f")
+        self.levels = settled.levels
+        self.lambda_f = settled.lambda_f
         self.support = scene.support
         self.sound_speed = scene.wave_speed
-        self.local_sound = stepper.local_sound
-        self.retime(stepper)
-        self.fractions = [
-            criteria.velocity_fraction(n, stepper.alpha, stepper.beta, stepper.resolved("beta_decay"))
-            for n in range(2, self.levels + 1)
-        ]
-        self.lengths = lengths(stepper.resolved("steps"), self.levels)
+        self.local_sound = settled.local_sound
+        self.retime(settled)
+        self.fractions = list(settled.fractions)
+        self.lengths = list(settled.lengths)
         self.ladder = Ladder(self.lengths)
-        self.limits = stepper.resolved("limiter")
+        self.limits = settled.limiter
         blocks = self.blocks = grid.geometry.blocks
         self.raw_level = ti.field(ti.i32, blocks)
         self.block_level = ti.field(ti.i32, blocks)
@@ -79,7 +61,7 @@ class RegionalSchedule(Schedule):
         self.present, self.passed = (ti.field(ti.i32, ()) for _ in range(2))
         """Tick, and ticks since the last call."""
         self.now = 0
-        self.sweeps = self.make_sweeps(stepper.grading) if self.levels > 1 else []
+        self.sweeps = self.make_sweeps(settled.grading) if self.levels > 1 else []
         self.around = Surroundings(grid)
         for field in self.level_fields:
             field.fill(EMPTY)
@@ -140,9 +122,9 @@ class RegionalSchedule(Schedule):
 
     # -- the clock ----------------------------------------------------------------------------------------------------
 
-    def retime(self, stepper: "Regional", timeline: Timeline | None = None) -> bool:
+    def retime(self, settled: SettledRegions, timeline: Timeline | None = None) -> bool:
         """Take another courant."""
-        self.reach = stepper.longest_courant * self.support
+        self.reach = settled.longest_courant * self.support
         return True
 
     def restart(self, now: int) -> None:

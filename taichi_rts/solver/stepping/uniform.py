@@ -3,9 +3,9 @@
 import math
 from typing import Any, ClassVar, Literal
 
-import taichi as ti
 from pydantic.dataclasses import dataclass
 
+from taichi_rts.device.backend import ti
 from taichi_rts.errors import StepperError
 from taichi_rts.scene.scene import Scene
 from taichi_rts.scene.validation import FROZEN, Positive, validated
@@ -14,7 +14,7 @@ from taichi_rts.solver.integrators.serna import Serna
 from taichi_rts.solver.integrators.symplectic_euler import SymplecticEuler
 from taichi_rts.solver.particles.particles import Particles
 from taichi_rts.solver.stepping import criteria
-from taichi_rts.solver.stepping.base import Courant, Schedule
+from taichi_rts.solver.stepping.base import ONE_STEP_COURANT, Courant, Schedule, Setup, Stepper
 from taichi_rts.solver.stepping.timeline import Timeline
 
 INTEGRATORS = {kind.name: kind for kind in (Serna, SymplecticEuler)}
@@ -23,7 +23,7 @@ SUBDIVISIONS = 64  # an adaptive step is a whole number of 64ths of the largest
 
 @validated(StepperError)
 @dataclass(frozen=True, config=FROZEN)
-class Uniform:
+class Uniform(Stepper):
     """All particles share one step.
 
     Attributes:
@@ -34,15 +34,24 @@ class Uniform:
         lambda_f: factor of the force limit (Eq. 2), used if adaptive.
     """
 
-    courant: Courant = 0.4
+    courant: Courant = ONE_STEP_COURANT
     integrator: Literal["serna", "symplectic_euler"] = "serna"
     adaptive: bool = False
     lambda_f: Positive = 0.25
 
     name: ClassVar[str] = "uniform"
-    extrapolates_density: ClassVar[bool] = False
-    keeps_past: ClassVar[bool] = False
-    drift: ClassVar[float] = 0.0
+    key: ClassVar[str] = "u"
+    block_integers: ClassVar[int] = 1
+    compared: ClassVar[tuple[Setup, ...]] = (
+        Setup("uniform"),
+        Setup("uniform-c", {"adaptive": True}, regional_sound=True),
+    )
+    mapped: ClassVar[tuple[Setup, ...]] = (
+        Setup("serna"),
+        Setup("euler", {"integrator": "symplectic_euler"}),
+        Setup("adaptive", {"adaptive": True}),
+        Setup("adaptive_c", {"adaptive": True}, regional_sound=True),
+    )
 
     @property
     def follows_sound(self) -> bool:
@@ -52,6 +61,10 @@ class Uniform:
     def make_integrator(self) -> Any:
         """Return the integrator's object."""
         return INTEGRATORS[self.integrator]()
+
+    def equal_step(self, scene: Scene) -> float:
+        """Its own."""
+        return self.courant
 
     def timeline(self, scene: Scene) -> Timeline:
         """Return a clock that ticks once a step, or 64 times the largest step if adaptive."""

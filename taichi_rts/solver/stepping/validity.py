@@ -1,16 +1,11 @@
 """The paper's scheme: every particle has a validity of its own (Goswami & Batty 2014, Algorithm 1, lines 10-16)."""
 
-from typing import TYPE_CHECKING
-
-import taichi as ti
-
+from taichi_rts.device.backend import ti
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.particles.particles import Particles
 from taichi_rts.solver.stepping.regions import RegionalSchedule
-
-if TYPE_CHECKING:
-    from taichi_rts.solver.stepping.regional import Regional
+from taichi_rts.solver.stepping.settled import SettledRegions
 
 
 @ti.data_oriented
@@ -20,8 +15,8 @@ class ValidityByParticle(RegionalSchedule):
     validity = level - (now - updated), so that no particle has to count it down (lines 14-16).
     """
 
-    def __init__(self, stepper: "Regional", scene: Scene, particles: Particles, grid: BlockGrid) -> None:
-        super().__init__(stepper, scene, particles, grid)
+    def __init__(self, settled: SettledRegions, scene: Scene, particles: Particles, grid: BlockGrid) -> None:
+        super().__init__(settled, scene, particles, grid)
         self.flag = ti.field(ti.i32, particles.capacity)
         """The compute flag of the particle at a place."""
 

@@ -3,7 +3,6 @@ import json
 
 import numpy as np
 import pytest
-import taichi as ti
 
 import taichi_rts as rts
 from taichi_rts.assembly.rewind import Rewind
@@ -11,6 +10,7 @@ from taichi_rts.commands.main import main
 from taichi_rts.compare import compare, jobs, references
 from taichi_rts.compare.jobs import Job
 from taichi_rts.compare.runner import Settings
+from taichi_rts.device.backend import ti
 from taichi_rts.solver.stepping.steppers import stepper_data
 from taichi_rts.trials import executors
 from taichi_rts.trials.executors import Here, Task, collect

@@ -4,7 +4,7 @@ import taichi_rts as rts
 from taichi_rts.compare import sweeps
 from taichi_rts.compare.runner import Settings, plan
 from taichi_rts.compare.sweeps import Sweep, parse_sweep
-from taichi_rts.compare.variants import equal_step, smallest_step
+from taichi_rts.compare.variants import smallest_step
 
 SCENE = rts.Scene(domain=rts.Box((0, 0), (2, 2)), fluids=[rts.Block((0, 0), (1, 1))], spacing=0.1)
 
@@ -89,9 +89,9 @@ def test_the_number_is_the_courant_number_of_the_longest_step():
     assert sweeps.make_stepper("paper", 0.6, {}) == rts.Regional(preset="paper", courant=0.6)
     assert sweeps.make_stepper("asynchronous", 0.6, {}) == rts.Asynchronous(courant=0.6)
     for options in ({"levels": 3}, {"levels": 3, "strict_cfl": True}):
-        assert equal_step(sweeps.make_stepper("regional", 0.6, options), SCENE) == pytest.approx(0.2)
-    assert equal_step(sweeps.make_stepper("paper", 0.4, {}), SCENE) == pytest.approx(0.4)
-    assert equal_step(rts.Asynchronous(courant=0.6), SCENE) == pytest.approx(0.6)
+        assert sweeps.make_stepper("regional", 0.6, options).equal_step(SCENE) == pytest.approx(0.2)
+    assert sweeps.make_stepper("paper", 0.4, {}).equal_step(SCENE) == pytest.approx(0.4)
+    assert rts.Asynchronous(courant=0.6).equal_step(SCENE) == pytest.approx(0.6)
 
 
 def test_uniform_runs_at_every_regional_base_step_are_added_once():

@@ -3,10 +3,10 @@ import subprocess
 import sys
 
 import pytest
-import taichi as ti
 
 import taichi_rts as rts
 from taichi_rts.device import backend
+from taichi_rts.device.backend import ti
 
 
 def test_unknown_arch_and_precision_list_the_choices():
@@ -56,7 +56,7 @@ def test_simulation_before_init_says_what_to_call(monkeypatch):
 
 def test_importing_starts_nothing():
     code = (
-        "import taichi_rts as rts; import taichi as ti; from taichi_rts import backend\n"
+        "import taichi_rts as rts; from taichi_rts.device import backend; from taichi_rts.device.backend import ti\n"
         "rts.load_scene('dam_break'); rts.Regional()\n"
         "assert ti.lang.impl.get_runtime().prog is None and backend._current is None"
     )
@@ -95,3 +95,51 @@ def test_fewer_threads_than_cores_are_free_to_move(monkeypatch):
     monkeypatch.setenv("TAICHI_RTS_PIN", "0")
     backend._pin_threads([11, 12, 13])
     assert len(calls) == 3
+
+
+def imported(choice, code="import taichi_rts"):
+    environment = os.environ | {"TAICHI_RTS_TAICHI": choice}
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, env=environment)
+
+
+def test_an_unknown_fork_is_one_error_that_names_the_choices():
+    said = imported("tachi").stderr.splitlines()
+    assert said[-1] == (
+        "taichi_rts.errors.BackendError: TAICHI_RTS_TAICHI='tachi' in the environment is unknown; choose one of taichi, "
+        "taichi_forge, quadrants, and install a fork with pip install 'taichi_rts[forge]' or 'taichi_rts[quadrants]'"
+    )
+
+
+@pytest.mark.parametrize(("fork", "extra"), [("taichi_forge", "forge"), ("quadrants", "quadrants")])
+def test_a_missing_fork_is_one_error_that_names_the_remedy(fork, extra):
+    hidden = f"import sys; sys.modules[{fork!r}] = None\nimport taichi_rts"
+    said = imported(fork, hidden).stderr.splitlines()
+    assert said[-1].startswith(
+        f"taichi_rts.errors.BackendError: TAICHI_RTS_TAICHI='{fork}' is not installed; install it with "
+        f"pip install 'taichi_rts[{extra}]', or set TAICHI_RTS_TAICHI to another of taichi, taichi_forge, quadrants"
+    )
+
+
+def test_the_command_line_ends_with_one_line_where_the_fork_is_unknown():
+    command = [sys.executable, "-m", "taichi_rts", "scenes"]
+    environment = os.environ | {"TAICHI_RTS_TAICHI": "tachi"}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 2
+    assert done.stderr.startswith("taichi-rts: error: TAICHI_RTS_TAICHI='tachi' in the environment is unknown")
+    assert done.stderr.count("\n") == 1
+
+
+def test_users_get_the_same_taichi():
+    assert rts.ti is ti is sys.modules[backend.FORK.module]
+    code = "import sys, taichi_rts as rts; assert rts.ti is sys.modules['taichi']; print(rts.ti.__name__)"
+    assert imported("", code).stdout == "taichi\n"
+
+
+def test_without_ggui_the_window_says_what_to_do(monkeypatch):
+    from taichi_rts.rendering import ggui
+
+    monkeypatch.setattr(ggui, "ti", object())  # as quadrants is
+    with pytest.raises(
+        rts.RenderError, match=r"has no GGUI.* use --renderer splatter without --gui, or set TAICHI_RTS"
+    ):
+        ggui.open_window("", 64, 64, visible=False)

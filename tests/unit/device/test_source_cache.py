@@ -2,11 +2,11 @@ import textwrap
 import types
 
 import pytest
-import taichi as ti
-from taichi.lang import kernel_impl
-from taichi.lang.ast import ast_transformer_utils
 
 from taichi_rts.device import source_cache
+from taichi_rts.device.backend import ti
+
+kernel_impl, ast_transformer_utils = ti.lang.kernel_impl, ti.lang.ast.ast_transformer_utils
 
 
 @pytest.mark.parametrize("text", ["", "   ", "x = 1", "    for i in range(3):\n", "y = " + " + ".join(["term"] * 40)])

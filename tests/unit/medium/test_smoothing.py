@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-import taichi as ti
 
+from taichi_rts.device.backend import ti
 from taichi_rts.medium.smoothing import KERNELS, lattice_sum, make_kernel
 
 SUPPORT = 0.3

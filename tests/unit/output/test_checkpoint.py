@@ -11,6 +11,7 @@ import pytest
 
 import taichi_rts as rts
 from taichi_rts.assembly.inventory import State, is_part, is_plain, transient_names
+from taichi_rts.device.backend import ti
 from taichi_rts.files.archive import open_archive, write_archive
 from taichi_rts.output import checkpoint
 from taichi_rts.output.checkpoint import Checkpoint, differences
@@ -118,8 +119,6 @@ def test_a_new_simulation_takes_it_up_and_nothing_is_left_out(start_taichi, quic
 
 def unknown(sim):
     """Attributes of a simulation's parts that are neither fields, plain, nor parts, nor code: state may hide there."""
-    import taichi as ti
-
     state, found, code = State(sim), [], ("function", "method", "Func", "MatrixType", "DataTypeCxx", "Kernel")
     for path, owner in state.owners.items():
         for name, value in owner.items():

@@ -9,11 +9,11 @@ import time
 from pathlib import Path
 
 import pytest
-import taichi as ti
 
 import taichi_rts as rts
 from taichi_rts.commands.interrupts import Interrupts
 from taichi_rts.commands.main import main
+from taichi_rts.device.backend import ti
 from taichi_rts.output.recorder import Recorder, checkpoint_times
 from taichi_rts.output.resume import checkpoint_name, newest
 

@@ -12,7 +12,6 @@ sys.path.append(str(Path(__file__).parents[1]))
 from programs import run
 
 trimesh = pytest.importorskip("trimesh")
-pytest.importorskip("scipy")
 
 SCENE = """
 spacing = 0.1

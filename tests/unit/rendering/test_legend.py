@@ -51,13 +51,17 @@ def test_panel_grows_with_the_picture():
     assert font_size(2160) == 54
 
 
-def test_delta_subscript_and_other_signs_leave_no_empty_box():
-    assert text_width("λ", 18) == text_width("lambda", 18)
-    assert text_width("t_b", 18) < text_width("tb", 18)
-    ink = draw_legend(blank(720), "", [], ["Δ"])
+@pytest.mark.parametrize("sign", "αβγδεζηθλμνρσφωΔΣΩ²³×·–−→√≤∞")
+def test_greek_letters_and_signs_leave_no_empty_box(sign):
+    ink = draw_legend(blank(720), "", [], [sign])
     tofu = draw_legend(blank(720), "", [], ["\uffff"])
     assert not np.array_equal(ink, tofu)
-    assert (ink.max(axis=2) < 60).sum() > 15
+    assert (ink.max(axis=2) < 200).sum() > 5
+
+
+def test_one_letter_after_an_underscore_is_a_subscript():
+    assert text_width("t_b", 18) < text_width("tb", 18)
+    assert text_width("dam_break_2d", 18) > text_width("dambreak2d", 18)  # a name is not
 
 
 def test_colour_bar_shows_its_colours_in_order():

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-import taichi as ti
 
 from taichi_rts.device import backend
+from taichi_rts.device.backend import ti
 from taichi_rts.errors import RenderError
 from taichi_rts.rendering import splat_kernels
 from taichi_rts.rendering.camera import Camera

@@ -98,6 +98,13 @@ def test_integrated_densities_see_the_whole_lattice_continued_in_corners_too(dim
     assert layer.depths.max() < scene.support  # so that none lies beyond the grid's margin
 
 
+def test_no_plane_lies_out_of_reach_or_beyond_the_grids_margin():
+    for kernel in ("cubic_spline", "wendland_c2"):
+        layer, _ = line_walls(filled(2, kernel=kernel, support_ratio=4.0))
+        assert layer.depths.max() < 4.0 * S
+        assert len(set(layer.depths)) == 2  # the first is 2.1 spacings deep, a third would be out of reach
+
+
 def wall_particles(scene):
     layer, owners = line_walls(scene)
     assert (owners == -1).all()

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
-import taichi as ti
 
-from taichi_rts.device.backend import Backend
+from taichi_rts.device.backend import Backend, ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.medium.smoothing import make_kernel
 from taichi_rts.solver.grid.geometry import Geometry

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-import taichi as ti
 
-from taichi_rts.device.backend import Backend
+from taichi_rts.device.backend import Backend, ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.medium.smoothing import make_kernel
 from taichi_rts.sampling.walls import WallLayer

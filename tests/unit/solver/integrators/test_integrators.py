@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-import taichi as ti
 
+from taichi_rts.device.backend import ti
 from taichi_rts.solver.integrators.serna import Serna
 from taichi_rts.solver.integrators.symplectic_euler import SymplecticEuler
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import taichi as ti
 
 import taichi_rts as rts
 from taichi_rts.assembly.inventory import parts
+from taichi_rts.device.backend import ti
 from taichi_rts.scene.geometry.bodies import bodies
 from taichi_rts.scene.geometry.making import make_solid
 from taichi_rts.solver.physics.timetable import Ticking

@@ -2,10 +2,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import taichi as ti
 
 import taichi_rts as rts
 from taichi_rts import simulation
+from taichi_rts.device.backend import ti
 from taichi_rts.medium.energy import measure_energy
 from taichi_rts.medium.equation_of_state import Tait
 from taichi_rts.medium.medium import Medium

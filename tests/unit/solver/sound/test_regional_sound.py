@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-import taichi as ti
 
 import taichi_rts as rts
+from taichi_rts.device.backend import ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.scene.loading import scene_from
 from taichi_rts.solver.sound.rule import SLACK
-from taichi_rts.solver.stepping.regions import lengths
+from taichi_rts.solver.stepping.settled import lengths
 
 G, S, R = 9.81, 0.05, 0.1
 REST = 1000.0
@@ -146,7 +146,8 @@ def test_levels_reach_from_the_cap_to_the_floor(steps, levels):
     scene = tank(rts.Block((0, 0), (1, 0.5)), sound_speed=SOUND)
     full = rts.Regional(steps=steps).in_scene(scene)
     assert (full.levels, full.courant, full.limiter) == (levels, 0.4, True)
-    assert full.steps == (steps or "half_octaves")
+    assert full.lengths == tuple(lengths(steps or "half_octaves", levels))
+    assert full.aligned
     assert rts.Regional().timeline(scene).tick == pytest.approx(0.4 * R / CAP)
     assert rts.Regional(levels=4).in_scene(scene).levels == 4
 

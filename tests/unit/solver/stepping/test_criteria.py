@@ -2,8 +2,8 @@ import math
 
 import numpy as np
 import pytest
-import taichi as ti
 
+from taichi_rts.device.backend import ti
 from taichi_rts.medium.equation_of_state import Tait
 from taichi_rts.solver.stepping import criteria
 

@@ -1,15 +1,15 @@
 import numpy as np
 import pytest
-import taichi as ti
 
 import taichi_rts as rts
 from taichi_rts.device import backend
+from taichi_rts.device.backend import ti
 from taichi_rts.solver.grid.geometry import Geometry
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.grid.surroundings import Surroundings
 from taichi_rts.solver.particles.particles import Particles
 from taichi_rts.solver.stepping.limiter import EMPTY, Ladder, NeighbourLimiter, Sweep
-from taichi_rts.solver.stepping.regions import lengths
+from taichi_rts.solver.stepping.settled import lengths
 
 
 def random_levels(geometry, n_max=5, seed=0):
