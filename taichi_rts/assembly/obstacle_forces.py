@@ -29,7 +29,7 @@ class ObstacleForces(NamedTuple):
 
 @ti.data_oriented
 class ForceMeter:
-    """Sums what the wall particles of each obstacle do to the fluid, with the sign turned round (Newton's third law).
+    """Sums the forces of each obstacle's wall particles on the fluid, with the opposite sign (Newton's third law).
 
     The pair forces are those of the momentum equation: pressure and viscosity. Obstacles at rest, whose particles are part of
     the walls at rest in a step, get `Walls` of their own here.

@@ -1,4 +1,4 @@
-"""What a run is judged by: energy, momentum, and how much work each level did."""
+"""How much work a run did: counts by level, and the share of a step that is done for all particles."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Overhead:
     Waiting for the device costs a GPU a little, so only a sample is timed.
     """
 
-    EVERY = 61  # prime, or it would meet the same pass of every cycle
+    EVERY = 61  # prime, or it would always sample the same pass of a cycle
 
     def __init__(self, particles: Particles) -> None:
         self.particles = particles
@@ -112,7 +112,7 @@ class Overhead:
 def speedup_bound(active_fraction: float, overhead_fraction: float, passes: float = 1.0) -> float:
     """Upper bound for the speed-up over uniform steps of the base step: 1 / (e p + (1-e) a).
 
-    `active_fraction` a holds sum_n f_n/n and the recomputation by pre-emption; `overhead_fraction` e is paid by all in each
-    of the p `passes` of a base step.
+    `active_fraction` a holds sum_n f_n/n and the recomputation by pre-emption; `overhead_fraction` e is the share of
+    the work that is done for all particles in each of the p `passes` of a base step.
     """
     return 1.0 / (overhead_fraction * passes + (1.0 - overhead_fraction) * active_fraction)

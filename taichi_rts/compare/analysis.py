@@ -1,4 +1,4 @@
-"""From the runs to what a reader wants to know: speed-ups over both baselines, the Pareto front, the verdict."""
+"""What follows from the runs: speed-ups over both baselines, the Pareto front, the verdict."""
 
 from __future__ import annotations
 

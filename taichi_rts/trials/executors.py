@@ -48,7 +48,7 @@ def processes(workers: int = 1) -> Iterator[ProcessPoolExecutor]:
     try:
         yield pool
     except BaseException:
-        for process in list((pool._processes or {}).values()):  # what runs there would take minutes to end by itself
+        for process in list((pool._processes or {}).values()):  # a task would take minutes to end by itself
             process.terminate()
         pool.shutdown(wait=False, cancel_futures=True)
         raise

@@ -193,7 +193,7 @@ class Motion:
         x = self.integrator.correct_position(self.near.x[k], a, a_new, dt)
         v = self.integrator.correct_velocity(self.particles.v[i], a, a_new, dt)
         v, a_new = self.limit(v, self.largest_speed), self.limit(a_new, self.largest_acceleration)
-        finite = True  # of what was given too: a position that is not a number has been clamped to a corner by now
+        finite = True  # also of the values given: a position that is NaN has been clamped to a corner by now
         for d in ti.static(range(self.particles.dim)):
             total = self.particles.x[i][d] + v[d] + a_new[d]
             finite = finite and not (ti.math.isnan(total) or ti.math.isinf(total))

@@ -62,7 +62,7 @@ class SoundRule:
         self.own = ti.field(float, self.blocks)
         """The largest sound speed of its particles, at their present compression."""
         self.felt = ti.field(float, self.blocks)
-        """What its neighbours notice of it: its wish, and half of its target."""
+        """What its neighbours take into account: its own need, and half of its target."""
         self.target = ti.field(float, self.blocks)
         self.ceiling = ti.field(float, self.blocks)
         self.limit = ti.field(float, self.blocks)
@@ -120,7 +120,7 @@ class SoundRule:
 
     @ti.func
     def is_stale(self, block, read_at):
-        """Whether what is known of an occupied block may have changed since it was looked at."""
+        """Whether the values of an occupied block may have changed since they were worked out."""
         stale = read_at >= 0 or self.wish[block] == 0.0
         if ti.static(self.grid.tracks_arrivals):
             stale = stale or self.grid.arrived[block] == 1
