@@ -1,7 +1,6 @@
 """Tries all bad input of tests/reliability and writes what each is answered: python studies/bad_input.py [PAGE].
 
-The page is build/bad_input.md unless another is named. Rows of checkpoints are only run by their test, which needs a
-run to spoil.
+The page is build/bad_input.md unless another is named. Rows of checkpoints are only run by their test: it needs a run to spoil.
 """
 
 import contextlib

@@ -2,8 +2,8 @@
 
     python studies/faults.py [--kills 20] [--only kill,full] [--seed 1]
 
-prints a table (docs/evidence/reliability.md). Lost are bytes of frames that the run had written, or would have, and that in
-the end are missing or differ from those of a run without a fault.
+prints a table (docs/evidence/reliability.md). Lost are bytes of frames that the run had written, or would have,
+and that in the end are missing or differ from those of a run without a fault.
 """
 
 import argparse

@@ -4,7 +4,6 @@ from taichi_rts.device.backend import init, ti  # first: it keeps Taichi from pr
 
 # isort: split
 from taichi_rts import importing  # noqa: F401  first, as Ctrl-C may come while the others are imported
-from taichi_rts.assembly.handover import change_stepper
 from taichi_rts.errors import (
     BackendError,
     CheckpointError,
@@ -18,6 +17,7 @@ from taichi_rts.errors import (
     TimeError,
 )
 from taichi_rts.medium.energy import Energy
+from taichi_rts.output.change_stepper import change_stepper
 from taichi_rts.output.checkpoint import load_checkpoint, save_checkpoint
 from taichi_rts.output.export import Exporter, write_particles
 from taichi_rts.output.series import Series

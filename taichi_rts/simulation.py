@@ -4,24 +4,30 @@ from __future__ import annotations
 
 import contextlib
 import time as clock
+import weakref
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, cast
 
 import numpy as np
 from PIL import Image
 
+from taichi_rts.assembly import budget
 from taichi_rts.assembly.build import assemble
 from taichi_rts.assembly.frame_times import frame_times
 from taichi_rts.assembly.obstacle_forces import ForceMeter, ObstacleForces
 from taichi_rts.assembly.resources import require
+from taichi_rts.assembly.snapshot import Snapshot
 from taichi_rts.assembly.work import Overhead, Tally
 from taichi_rts.device import backend as backends
 from taichi_rts.device.backend import ti
 from taichi_rts.device.ownership import guarded
 from taichi_rts.errors import Error, Interrupted, SimulationDivergedError, TimeError
-from taichi_rts.medium.energy import Energy, measure_energy
+from taichi_rts.medium.energy import Energy
+from taichi_rts.readings.diagnosis import diagnose
+from taichi_rts.readings.reading import Moment, Reading
+from taichi_rts.rendering.painter import Painter, PictureOptions
 from taichi_rts.sampling.sampling import sample
-from taichi_rts.scene.placing import at_origin, origin_of
+from taichi_rts.scene.placing import at_origin, origin_of, placed
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.stepping.base import Stepper
 from taichi_rts.solver.stepping.regional import Regional
@@ -47,7 +53,8 @@ class Simulation:
         local: the same with its coordinates counted from `origin`, as the device has them.
     """
 
-    transient = frozenset({"_fluids", "taichi_start"})
+    transient = frozenset({"_fluids", "taichi_start", "_latest"})
+    _latest: weakref.ref[Reading] | None = None
 
     def __init__(
         self, scene: Scene, stepper: Stepper | None = None, *, debug: bool = False, started: bool = True
@@ -140,7 +147,8 @@ class Simulation:
             if time > self._time or time == 0.0 == self._time:
                 with contextlib.suppress(SimulationDivergedError):  # `check` says more
                     self.advance_to(time)
-                self.check()
+                present = self.read()  # held until all have looked at it
+                _require_whole(present)
                 for look in looks:
                     look(self)
         return self
@@ -151,15 +159,10 @@ class Simulation:
         That is: a state is not finite, speeds or accelerations had to be limited, or a density is not between 0.02 and 2 of
         rest. It reads the state, so it is for once in a while; `advance_to` itself notices only what is not finite.
         """
-        from taichi_rts.readings.diagnosis import diagnose  # only here, as it reads simulations
-
-        if (found := diagnose(self)) is not None:
-            raise SimulationDivergedError(f"blown up: {found}")
+        _require_whole(self.read())
 
     def show(self, **options: Any) -> Image.Image:
         """Return a picture of the present state, which a notebook shows; `options` are those of `PictureOptions`."""
-        from taichi_rts.rendering.painter import Painter, PictureOptions  # only here: nothing else below needs pictures
-
         return Image.fromarray(Painter(self.scene, PictureOptions(**options)).paint(self))
 
     def __repr__(self) -> str:
@@ -174,7 +177,7 @@ class Simulation:
 
     def _potential(self, time: float) -> float:
         """Potential energy [J] that the present positions have in the gravity of `time` [s]."""
-        return measure_energy(self.local, self.medium, *self.local_state()[:3], time).potential
+        return self.read().potential_energy(time)
 
     def _advance(self, time: float) -> None:
         target = self.timeline.ticks_until(time)
@@ -216,7 +219,7 @@ class Simulation:
 
     def ids(self) -> np.ndarray:
         """Stable ids, (N,), of the particles that all readers speak of, ascending; an outlet takes some out for good."""
-        return self.particles.ids()
+        return self.read().ids.copy()
 
     @property
     def removed_count(self) -> int:
@@ -233,76 +236,89 @@ class Simulation:
         """Point [m], (dim,), from which the run counts its positions: 0 unless the domain lies far from it (`placing`)."""
         return origin_of(self.scene)
 
+    def read(self) -> Reading:
+        """Return the present state: one object for all that ask at one time, as long as any of them holds it."""
+        found = self._latest() if self._latest else None
+        if found is None or found.moment != Moment.of(self):
+            found = Reading.of(self, self._fluids, self._tally.particle_updates)
+            self._latest = weakref.ref(found)
+        return found
+
+    def restored(self) -> None:
+        """Take note that fields and values have been put back to what they were at another time."""
+        self.grid.restored()
+        self._latest = None
+
+    def snapshot(self) -> Snapshot:
+        """Return what any stepper needs to go on from the present time (`continue_from`)."""
+        now = self.read()
+        state = now.local_positions, now.velocities, now.densities
+        return Snapshot.of(self, state, now.ids, self._gravity_work)
+
+    def continue_from(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot of a run of the same scene, taken at a tick of this clock; statistics and budgets begin anew."""
+        snapshot.put_into(self)
+        self._time, self._gravity_work, self._latest = snapshot.time, snapshot.gravity_work, None
+        self.solver.sorts = 0
+        self._tally = Tally(self.schedule.levels, base_steps=self.schedule.steps)
+        self.start()
+
     def placed(self, x: np.ndarray) -> np.ndarray:
         """Positions `x` [m], (..., dim), counted from `origin`, as the scene counts: in double precision unless that is 0."""
-        if not any(self.origin):
-            return x
-        return np.clip(x + np.asarray(self.origin), self.scene.domain.lower, self.scene.domain.upper)
+        return placed(self.scene, x)
 
     def state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Positions [m] and velocities [m/s], (N, dim), densities [kg/m^3] and levels, (N,), at `time`, by particle id.
 
         Reals have the run's precision, positions in a domain far from 0 double precision.
         """
-        x, v, rho, level = self.local_state()
-        return self.placed(x), v, rho, level
+        now = self.read()
+        return now.positions.copy(), now.velocities.copy(), now.densities.copy(), now.levels.copy()
 
     def local_state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """As `state`, with positions [m], (N, dim), counted from `origin`: all reals have the run's precision."""
-        dtype, born = self.backend.numpy_dtype, self.particles.born
-        x, v = np.empty((born, self.scene.dim), dtype), np.empty((born, self.scene.dim), dtype)
-        rho, level = np.empty(born, dtype), np.empty(born, np.int32)
-        now, tick = self.timeline.now, self.timeline.tick
-        self.motion.export(now, tick, self._time - self.timeline.time, x, v, rho, level)
-        if self.count == born:
-            return x, v, rho, level
-        ids = self.ids()
-        return x[ids], v[ids], rho[ids], level[ids]
+        now = self.read()
+        return now.local_positions.copy(), now.velocities.copy(), now.densities.copy(), now.levels.copy()
 
     def positions(self) -> np.ndarray:
         """Positions [m], (N, dim), predicted to `time`, in order of particle id; far from 0 in double precision (`state`)."""
-        return self.state()[0]
+        return self.read().positions.copy()
 
     def velocities(self) -> np.ndarray:
         """Velocities [m/s], (N, dim), predicted to `time`, in order of particle id."""
-        return self.state()[1]
+        return self.read().velocities.copy()
 
     def densities(self) -> np.ndarray:
         """Densities [kg/m^3], (N,), by particle id: of each particle's last evaluation, with `Asynchronous` at `time`."""
-        return self.state()[2]
+        return self.read().densities.copy()
 
     def pressures(self) -> np.ndarray:
         """Pressures [Pa], (N,), by particle id, that belong to `densities`."""
-        return self.medium.equation_of_state.pressure_numpy(self.densities())
+        return self.read().pressures.copy()
 
     def sound_speeds(self) -> np.ndarray:
         """Sound speeds [m/s], (N,), at each particle's last evaluation, by particle id."""
-        if self.sound is None:
-            return np.full(self.count, self.medium.sound_speed)
-        return self.particles.to_numpy(self.particles.sound)
+        return self.read().sound_speeds.copy()
 
     def levels(self) -> np.ndarray:
         """Levels n, (N,): each particle's step is n base steps. In order of particle id."""
-        return self.state()[3]
+        return self.read().levels.copy()
 
     def fluids(self) -> np.ndarray:
         """Place of each particle's fluid in the scene, (N,), len(fluids) for what has flowed in. In order of particle id."""
-        unborn = self.particles.born - len(self._fluids)
-        return np.pad(self._fluids, (0, unborn), constant_values=len(self.scene.fluids))[self.ids()]
+        return self.read().fluids.copy()
 
     def steps(self) -> np.ndarray:
         """Steps [s], (N,): level times base step (`Uniform(adaptive=True)`: at most). In order of particle id."""
-        return self.particles.to_numpy(self.particles.level) * self.base_step
+        return self.read().steps.copy()
 
     def cell_times(self) -> np.ndarray:
         """Time [s] of each particle's last force evaluation, (N,), by particle id: asynchronous cells run ahead of `time`."""
-        return self.particles.to_numpy(self.particles.updated) * self.timeline.tick
+        return self.read().cell_times.copy()
 
     def leads(self) -> np.ndarray:
         """How far [s] the end of each particle's step lies ahead of the earliest end, (N,). In order of particle id."""
-        p = self.particles
-        ends = p.to_numpy(p.updated) + p.to_numpy(p.level) * self.schedule.base_ticks
-        return (ends - ends.min(initial=np.iinfo(ends.dtype).max)) * self.timeline.tick
+        return self.read().leads.copy()
 
     @property
     def statistics(self) -> dict[str, Any]:
@@ -325,45 +341,36 @@ class Simulation:
 
     def energy(self) -> Energy:
         """Kinetic, potential and internal energy [J] at `time`."""
-        return measure_energy(self.local, self.medium, *self.local_state()[:3], self._time)
+        return self.read().energy
+
+    def momentum(self) -> np.ndarray:
+        """Total momentum [kg m/s], (dim,), at `time`."""
+        return self.read().momentum.copy()
 
     @property
     def keeps_work(self) -> bool:
         """Whether `work` is known."""
-        return self.particles.has_budget or not (self.motion.moving_walls or self.inflows)
+        return budget.keeps_work(self)
 
     def work(self) -> float:
         """Energy [J] that changes of gravity, moving walls, moving obstacles and inflows have put in until `time`.
 
-        What flows in brings its kinetic and potential energy, what flows out takes its own along. Moving things and inflows
-        need a debug run, else raises `Error`.
+        Moving things and inflows need a debug run, else raises `Error` (`budget.work`).
         """
-        total = self._gravity_work
-        p = self.particles
-        if self.motion.moving_walls or self.inflows:
-            if not self.keeps_work:
-                raise Error("the work of moving walls, moving obstacles and inflows needs Simulation(..., debug=True)")
-            elapsed = self._time - p.to_numpy(p.updated) * self.timeline.tick
-            done = p.to_numpy(p.work).astype(float) + elapsed * p.to_numpy(p.power)
-            total += self.medium.mass * float(done.sum()) + (self.inflows.energy if self.inflows else 0.0)
-        if self.outlets:
-            total += self.outlets.work - self.outlets.energy
-        return total
+        return budget.work(self, self._gravity_work)
 
     def sound_work(self) -> float:
-        """Energy [J] that changes of the regional sound speed and of reference densities have put in; negative if taken out.
+        """Energy [J] that changes of the regional sound speed have put in (`budget.sound_work`); raises `Error` as `work`."""
+        return budget.sound_work(self)
 
-        A particle that becomes stiffer under the same pressure holds less energy. Needs a debug run, else raises `Error`.
-        """
-        if self.sound is None:
-            return 0.0
-        if not self.particles.has_budget:
-            raise Error("the work of changes of the sound speed needs Simulation(..., debug=True)")
-        return self.medium.mass * float(self.particles.to_numpy(self.particles.sound_work).astype(float).sum())
+    @property
+    def keeps_momentum_budget(self) -> bool:
+        """Whether `momentum_drift` can say anything."""
+        return budget.keeps_momentum_budget(self)
 
-    def momentum(self) -> np.ndarray:
-        """Total momentum [kg m/s], (dim,), at `time`."""
-        return self.medium.mass * self.velocities().astype(np.float64).sum(axis=0)
+    def momentum_drift(self) -> np.ndarray:
+        """Momentum [kg m/s], (dim,), that no outer force accounts for; raises `Error` as `budget.momentum_drift`."""
+        return budget.momentum_drift(self, self.momentum() - self._initial_momentum)
 
     def obstacle_forces(self) -> ObstacleForces:
         """Forces [N] and torques [N m] of the fluid on each obstacle, in the scene's order, at the last step up to `time`.
@@ -378,32 +385,7 @@ class Simulation:
         found = self._meter.measure(self.medium.mass, self.timeline.now, self.timeline.tick)
         return found._replace(pivots=found.pivots + np.asarray(self.origin))
 
-    @property
-    def keeps_momentum_budget(self) -> bool:
-        """Whether `momentum_drift` can say anything."""
-        scene = self.scene
-        return self.particles.has_budget and not (
-            scene.body_force or scene.gravity_changes or scene.inflows or scene.outlets
-        )
 
-    def momentum_drift(self) -> np.ndarray:
-        """Momentum [kg m/s], (dim,), that no outer force accounts for: the change less gravity's and the walls' share.
-
-        Zero to rounding with uniform steps, where partners push each other equally at the same time. Needs a debug run and a
-        scene without body force, changes of gravity, inflows and outlets, else raises `Error`.
-        """
-        if not self.keeps_momentum_budget:
-            raise Error(
-                "the momentum budget needs Simulation(..., debug=True), "
-                "and a scene without body_force, gravity_changes, inflows and outlets"
-            )
-        p = self.particles
-        elapsed = self._time - p.updated.to_numpy() * self.timeline.tick
-        walls = p.wall_push.to_numpy().astype(float) + elapsed[:, None] * p.a_walls.to_numpy()
-        if p.has_past and (ahead := elapsed < 0.0).any():  # whose velocity is interpolated between two evaluations
-            step = (p.updated.to_numpy() - p.past_updated.to_numpy())[ahead] * self.timeline.tick
-            share = (-elapsed[ahead] / step)[:, None]
-            now, before = (field.to_numpy()[ahead].astype(float) for field in (p.wall_push, p.past_wall_push))
-            walls[ahead] = now + share * (before - now)
-        gravity = self.count * self._time * np.asarray(self.scene.acceleration)
-        return self.momentum() - self._initial_momentum - self.medium.mass * (walls.sum(axis=0) + gravity)
+def _require_whole(state: Reading) -> None:
+    if (found := diagnose(state)) is not None:
+        raise SimulationDivergedError(f"blown up: {found}")

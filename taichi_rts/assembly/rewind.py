@@ -21,7 +21,7 @@ class Rewind:
 
     def __init__(self, sim: Any) -> None:
         state = State(sim)
-        self.grid = sim.grid
+        self.sim = sim
         self.fields = list(state.fields.values())
         self.owners: list[tuple[dict[str, Any], dict[str, Any], frozenset[str]]] = []
         values: dict[str, dict[str, Any]] = {path: {} for path in state.owners}
@@ -39,7 +39,7 @@ class Rewind:
             for late in [name for name in owner if name not in names]:
                 del owner[late]  # hides what the class says, such as `Schedule.needs_sorting`
             owner.update(copy.deepcopy(values))
-        self.grid.restored()
+        self.sim.restored()
 
     def _copies(self) -> list[Any]:
         """Return a field like each, in several buffers if one would be too large for the device's addresses."""

@@ -38,10 +38,15 @@ class Tally:
         for k, n in enumerate(updates or all_at_first):
             self.updates[k] += n
 
+    @property
+    def particle_updates(self) -> int:
+        """Updates so far."""
+        return sum(self.updates)
+
     def statistics(self) -> dict[str, Any]:
         """Return the counts as a plain dict; fractions per level are averages over all particles and steps."""
         total = max(1, sum(self.particle_steps))
-        updates, full = sum(self.updates), max(1, self.possible)
+        updates, full = self.particle_updates, max(1, self.possible)
         return {
             "base_steps": self.base_steps,
             "particle_updates": updates,

@@ -125,10 +125,10 @@ class _Follower:
         if self.sim is None:
             self.sim = sim
             self.start = Rewind(sim) if self.job.repeats > 1 else None
-        x, v, rho, _ = sim.state()
+        now = sim.read()
         if len(self.record.times) % self.every == 0:
-            self.neighbours.append(mean_neighbours(x, sim.scene.support))
-        self.record.append(sim.time, x, v, rho, sim.pressures(), sim.energy())
+            self.neighbours.append(mean_neighbours(now.positions, now.scene.support))
+        self.record.append(now)
 
 
 def _work(sim: Any, statistics: dict[str, Any], neighbours: float) -> dict[str, Any]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
+
+from taichi_rts.readings.reading import Reading
 
 
 @dataclass
@@ -28,14 +29,14 @@ class Trajectory:
     pressures: list[np.ndarray] = field(default_factory=list)
     energies: list[tuple[float, ...]] = field(default_factory=list)
 
-    def append(self, time: float, x: np.ndarray, v: np.ndarray, rho: np.ndarray, p: np.ndarray, energy: Any) -> None:
-        """Add the state at `time` [s]."""
-        self.times.append(float(time))
-        self.positions.append(x)
-        self.velocities.append(v)
-        self.densities.append(rho)
-        self.pressures.append(p.astype(rho.dtype))
-        self.energies.append(tuple(float(part) for part in energy))
+    def append(self, now: Reading) -> None:
+        """Add a state."""
+        self.times.append(float(now.time))
+        self.positions.append(now.positions)
+        self.velocities.append(now.velocities)
+        self.densities.append(now.densities)
+        self.pressures.append(now.pressures.astype(now.densities.dtype))
+        self.energies.append(tuple(float(part) for part in now.energy))
 
     def to_bytes(self) -> bytes:
         """Return the trajectory as a compressed npz file without pickled objects."""

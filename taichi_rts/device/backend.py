@@ -280,9 +280,8 @@ def _pin_threads(started: list[int]) -> None:
     """Give every thread of Taichi's pool, the last of those that `ti.init` has `started`, a core of its own.
 
     They sleep between loops, and Linux wakes them on the core that they were woken from: two threads then share one core for
-    milliseconds, longer than most kernels take (docs/evidence/speed.md). Only if there is a thread for every core that the
-    process may use: fewer threads are for sharing the machine, and must be free to move. TAICHI_RTS_PIN=0 in the environment
-    turns it off.
+    milliseconds, longer than most kernels take (docs/evidence/speed.md). Only if there is a thread for every core that it may
+    use: fewer threads are for sharing the machine, and must be free to move. TAICHI_RTS_PIN=0 in the environment turns it off.
     """
     if not hasattr(os, "sched_setaffinity") or os.environ.get("TAICHI_RTS_PIN", "1") == "0":
         return

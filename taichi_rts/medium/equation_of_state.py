@@ -53,6 +53,13 @@ class Tait:
     def adapt(self, i, block, rho, elapsed):
         """Take note that particle `i` in `block` now has density `rho` [kg/m^3], `elapsed` [s] after its last evaluation."""
 
+    sound: Any = None
+    """Sound speeds [m/s], (N,), by particle id, where `on_host` has each particle's own."""
+
+    def on_host(self) -> Any:
+        """Return what gives `pressure_numpy`, `specific_energy` and `sound` at the present state, also once that has changed."""
+        return self
+
     def pressure_numpy(self, rho: Any) -> Any:
         """Pressure [Pa] for a NumPy array of densities [kg/m^3]."""
         return np.maximum(self.background + self.stiffness * ((rho / self.rest_density) ** 7 - 1.0), 0.0)

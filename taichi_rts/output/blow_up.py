@@ -13,7 +13,7 @@ from taichi_rts.files.writing import write_json
 from taichi_rts.output.export import ATTRIBUTES, capture, write_particles
 from taichi_rts.particle_files.frame import ParticleFrame
 from taichi_rts.readings.diagnosis import Diagnosis, diagnose
-from taichi_rts.simulation import Simulation
+from taichi_rts.readings.reading import Readable, Reading
 
 FOLDER = "blow_up"
 
@@ -29,7 +29,7 @@ class BlowUpGuard:
         found: the first diagnosis of each run that has blown up; later ones would only show the debris.
     """
 
-    def __init__(self, runs: Mapping[Any, Simulation], folder: Path) -> None:
+    def __init__(self, runs: Mapping[Any, Readable], folder: Path) -> None:
         self.runs = runs
         self.folder = folder / FOLDER
         self.found: dict[Any, Diagnosis] = {}
@@ -37,14 +37,15 @@ class BlowUpGuard:
 
     def look(self) -> None:
         """Look at every run that was whole; raises `SimulationDivergedError` if none is any more."""
-        for number, (key, sim) in enumerate(self.runs.items()):
+        for number, (key, run) in enumerate(self.runs.items()):
             if key in self.found:
                 continue
-            if (diagnosis := diagnose(sim)) is None:
-                self._before[key] = capture(sim, tuple(ATTRIBUTES))
+            now = run.read()
+            if (diagnosis := diagnose(now)) is None:
+                self._before[key] = capture(now, tuple(ATTRIBUTES))
             else:
                 self.found[key] = diagnosis
-                self._dump(number, key)
+                self._dump(number, key, now)
         if len(self.found) == len(self.runs):
             self.stop()
 
@@ -53,13 +54,13 @@ class BlowUpGuard:
         first = min(self.found.values(), key=lambda each: each.time)
         raise SimulationDivergedError(f"blown up: {first} The state before and after is in {self.folder}")
 
-    def _dump(self, number: int, key: Any) -> None:
+    def _dump(self, number: int, key: Any, now: Reading) -> None:
         """Write the state at the last whole frame, if there was one, the present one, and the diagnosis."""
         end = "" if number == 0 else f"_{number + 1}"
         try:
             if key in self._before:
                 write_particles(self.folder / f"before{end}.vtu", self._before[key])
-            write_particles(self.folder / f"after{end}.vtu", capture(self.runs[key], tuple(ATTRIBUTES)))
+            write_particles(self.folder / f"after{end}.vtu", capture(now, tuple(ATTRIBUTES)))
             write_json(self.folder / f"diagnosis{end}.json", plain(self.found[key]))
         except OutputError:  # the diagnosis is more important than the full disk
             self.folder = self.folder.with_name(f"{FOLDER} (which could not be written)")

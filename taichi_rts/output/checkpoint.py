@@ -149,7 +149,7 @@ class Checkpoint:
         state = State(sim)
         with self.archive.trusted_by_nobody():
             self._restore(run, data, state)
-        sim.grid.restored()
+        sim.restored()
 
     def _restore(self, run: int, data: Mapping[str, Any], state: State) -> None:
         self._compare("field", set(data["fields"]), set(state.fields))

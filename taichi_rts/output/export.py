@@ -15,21 +15,20 @@ from taichi_rts.files.writing import write_bytes
 from taichi_rts.particle_files.formats import FORMATS, require_format
 from taichi_rts.particle_files.frame import ParticleFrame
 from taichi_rts.particle_files.vtu import collection
-from taichi_rts.simulation import Simulation
+from taichi_rts.readings.reading import Readable, Reading
 
-State = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-ATTRIBUTES: dict[str, Callable[[Simulation, State], np.ndarray]] = {
-    "id": lambda sim, state: sim.ids(),
-    "velocity": lambda sim, state: state[1],
-    "density": lambda sim, state: state[2],
-    "pressure": lambda sim, state: sim.medium.equation_of_state.pressure_numpy(state[2]),
-    "level": lambda sim, state: state[3],
-    "step": lambda sim, state: sim.steps(),
-    "cell_time": lambda sim, state: sim.cell_times(),
-    "sound_speed": lambda sim, state: sim.sound_speeds(),
-    "fluid": lambda sim, state: sim.fluids(),
+ATTRIBUTES: dict[str, Callable[[Reading], np.ndarray]] = {
+    "id": lambda now: now.ids,
+    "velocity": lambda now: now.velocities,
+    "density": lambda now: now.densities,
+    "pressure": lambda now: now.pressures,
+    "level": lambda now: now.levels,
+    "step": lambda now: now.steps,
+    "cell_time": lambda now: now.cell_times,
+    "sound_speed": lambda now: now.sound_speeds,
+    "fluid": lambda now: now.fluids,
 }
-"""What can be known of a particle, by name: to add one, write a function of a simulation and its `state()`."""
+"""What can be known of a particle, by name: to add one, write a function of a `Reading`."""
 DEFAULT_ATTRIBUTES = ("id", "velocity", "density", "pressure", "level")
 
 
@@ -42,17 +41,17 @@ def require_attributes(names: Sequence[str]) -> None:
             raise OutputError(f"--attributes {name!r} is no attribute; choose from {', '.join(ATTRIBUTES)}{hint}")
 
 
-def capture(sim: Simulation, attributes: Sequence[str] = DEFAULT_ATTRIBUTES) -> ParticleFrame:
-    """Return the particles of `sim` at its present time; reals are of its precision, positions as `Simulation.state` says."""
+def capture(state: Readable, attributes: Sequence[str] = DEFAULT_ATTRIBUTES) -> ParticleFrame:
+    """Return the particles of a `Reading`, or of a `Simulation` at its present time.
+
+    Reals are of the run's precision, positions as `Simulation.state` says.
+    """
     require_attributes(attributes)
-    state = sim.state()
-    found = {name: ATTRIBUTES[name](sim, state) for name in attributes}
-    reals = {
-        name: values.astype(sim.backend.numpy_dtype, copy=False)
-        for name, values in found.items()
-        if values.dtype.kind == "f"
-    }
-    return ParticleFrame(state[0], found | reals, sim.time, sim.scene.spacing, sim.origin)
+    now = state.read()
+    found = {name: ATTRIBUTES[name](now) for name in attributes}
+    precision = now.velocities.dtype
+    reals = {name: values.astype(precision, copy=False) for name, values in found.items() if values.dtype.kind == "f"}
+    return ParticleFrame(now.positions, found | reals, now.time, now.scene.spacing, now.origin)
 
 
 def write_particles(path: str | Path, frame: ParticleFrame) -> None:
@@ -103,14 +102,14 @@ class Exporter:
         """Go on behind the frames of `times` [s], which an earlier run has written."""
         self.times = list(times)
 
-    def __call__(self, sim: Simulation) -> None:
-        """Write the next frame."""
+    def __call__(self, state: Readable) -> None:
+        """Write the next frame: a `Reading`, or the present state of a `Simulation`."""
         if not self.formats:
             return
-        frame = capture(sim, self.attributes)
+        frame = capture(state, self.attributes)
         for name in self.formats:
             require_format(name, frame.dim)
-        self.times.append(sim.time)
+        self.times.append(frame.time)
         for name in self.formats:
             if FORMATS[name].single and frame.offset.any() and name not in self.offsets:
                 warn_of_offset(name, frame)

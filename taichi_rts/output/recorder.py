@@ -31,6 +31,7 @@ from taichi_rts.output.export import DEFAULT_ATTRIBUTES, Exporter
 from taichi_rts.output.panels import Panel
 from taichi_rts.output.resume import checkpoint_name, newest, output_folder
 from taichi_rts.output.series import Series
+from taichi_rts.readings.reading import Reading
 from taichi_rts.rendering import legend
 from taichi_rts.rendering.painter import Painter, PictureOptions, make_renderer
 from taichi_rts.scene.scene import Scene
@@ -172,10 +173,10 @@ class Recorder:
         """Return the path of a frame."""
         return self.recording.folder / "frames" / f"{number:06d}.png"
 
-    def paint(self) -> np.ndarray:
-        """Return the picture of all panels at the present time."""
+    def paint(self, frame: Mapping[Any, Reading]) -> np.ndarray:
+        """Return the picture of all panels, of the states by stepper."""
         images = [
-            painter.paint(self.runs[panel.stepper]) for panel, painter in zip(self.panels, self.painters, strict=True)
+            painter.paint(frame[panel.stepper]) for panel, painter in zip(self.panels, self.painters, strict=True)
         ]
         if len(images) == 1:
             return images[0]
@@ -200,12 +201,7 @@ class Recorder:
                 for sim in self.runs.values():
                     with contextlib.suppress(SimulationDivergedError):  # which the guard says in full
                         sim.advance_to(max(time, sim.time))
-                self.guard.look()
-                if number is None:
-                    self.save_checkpoint()
-                else:
-                    self._write_frame(number, films)
-                    on_frame(time)
+                self._take(time, number, films, on_frame)
             for film in films:
                 film.close()
             summary = self.summary()
@@ -220,6 +216,18 @@ class Recorder:
                 film.drop()
         return summary
 
+    def _take(self, time: float, number: int | None, films: list[Any], on_frame: Callable[[float], None]) -> None:
+        """Write what is due at `time` [s]: frame `number`, or for None a checkpoint."""
+        frame = {
+            stepper: sim.read() for stepper, sim in self.runs.items()
+        }  # all that look at it share it while it is held
+        self.guard.look()
+        if number is None:
+            self.save_checkpoint()
+        else:
+            self._write_frame(frame, number, films)
+            on_frame(time)
+
     def moments(self, end_time: float) -> Iterator[tuple[float, int | None]]:
         """Yield what is still to be done until `end_time`: times [s] with the number of a frame, None for a checkpoint."""
         times = enumerate(frame_times(end_time, self.recording.fps))
@@ -228,19 +236,18 @@ class Recorder:
         saves = (time for time in checkpoint_times(end_time, self.recording.checkpoint_every) if time > present)
         return heapq.merge(frames, ((time, None) for time in saves), key=lambda moment: (moment[0], moment[1] is None))
 
-    def _write_frame(self, number: int, films: list[Any]) -> None:
-        image = self.paint() if self.recording.pictures else None
+    def _write_frame(self, frame: Mapping[Any, Reading], number: int, films: list[Any]) -> None:
+        image = self.paint(frame) if self.recording.pictures else None
         self._check_folder()
-        for sim in self.runs.values():
-            self.exporter(sim)
-        for series in self.series:
-            series()
+        for state, series in zip(frame.values(), self.series, strict=True):
+            self.exporter(state)
+            series(state)
         if image is not None:
             write_png(self.frame_path(number), image)
             for film in films:
                 film.append(image)
         self.frames_done = number + 1
-        self.times.append(min(sim.time for sim in self.runs.values()))
+        self.times.append(min(state.time for state in frame.values()))
 
     def _check_folder(self) -> None:
         if not self.lock.check():

@@ -13,10 +13,10 @@ from taichi_rts.errors import OutputError
 from taichi_rts.files.writing import write_bytes
 from taichi_rts.readings import measures
 from taichi_rts.readings.measures import FaceForces
+from taichi_rts.readings.reading import Readable, Reading
 from taichi_rts.scene.geometry.periodic import periods
 from taichi_rts.scene.parts import probes
 from taichi_rts.scene.parts.conditions import AXES
-from taichi_rts.simulation import Simulation
 
 
 class Series:
@@ -32,10 +32,11 @@ class Series:
     dimensions energies and forces are per metre of depth.
     """
 
-    def __init__(self, path: str | Path, sim: Simulation, times: Sequence[float] = ()) -> None:
+    def __init__(self, path: str | Path, sim: Readable, times: Sequence[float] = ()) -> None:
         self.path = Path(path)
         self.sim = sim
-        self.forces = FaceForces(sim.local, sim.medium)
+        start = sim.read()
+        self.forces = FaceForces(start.local, start.medium)
         self.times: list[float] = []
         """Times [s] of the rows written."""
         if times and self.path.exists():
@@ -43,56 +44,51 @@ class Series:
             rows = self.path.read_bytes().splitlines(keepends=True)[: len(times) + 1]
             write_bytes(self.path, b"".join(rows))
 
-    def __call__(self, sim: Simulation | None = None) -> None:
-        """Add a row; `sim` is the one it was made for, for callers that name it."""
-        row = self.measure()
-        digits = 15 if any(self.sim.origin) else 9  # far from 0 coordinates need more of them
+    def __call__(self, state: Readable | None = None) -> None:
+        """Add a row: a `Reading` of the simulation it was made for, or that simulation, which is also what None stands for."""
+        now = (state or self.sim).read()
+        row = self.measure(now)
+        digits = 15 if any(now.origin) else 9  # far from 0 coordinates need more of them
         line = ",".join(f"{value:.{digits}g}" for value in row.values()) + "\n"
         if self.times and self.path.exists():  # the folder may have been deleted meanwhile
             append(self.path, line.encode())
         else:
             write_bytes(self.path, (",".join(row) + "\n" + line).encode())
-        self.times.append(self.sim.time)
+        self.times.append(now.time)
 
-    def measure(self) -> dict[str, float]:
-        """Return the present values by column."""
-        sim, scene = self.sim, self.sim.local
-        x, v, rho, level = sim.local_state()
-        p = sim.medium.equation_of_state.pressure_numpy(rho)
-        lengths = periods(scene)
-        centre = x.sum(axis=0, dtype=np.float64) / max(1, len(x)) + sim.origin  # outlets may have taken out all
+    def measure(self, state: Readable | None = None) -> dict[str, float]:
+        """Return the values by column, at present or of a `state`."""
+        now = (state or self.sim).read()
+        scene, x, p = now.local, now.local_positions, now.pressures
+        centre = x.sum(axis=0, dtype=np.float64) / max(1, len(x)) + now.origin  # outlets may have taken out all
         points = np.array([probe.position for probe in scene.probes]).reshape(-1, scene.dim)
-        pressures = measures.interpolate(x, p, points, sim.medium.kernel, lengths)
-        heights = [measures.water_height(scene, sim.medium, x, np.asarray(g.position)) for g in scene.gauges]
+        pressures = measures.interpolate(x, p, points, now.medium.kernel, periods(scene))
+        heights = [measures.water_height(scene, now.medium, x, np.asarray(g.position)) for g in scene.gauges]
         return {
-            "time": sim.time,
-            **{f"{name}_energy": value for name, value in sim.energy()._asdict().items()},
-            "front": measures.front(x) + sim.origin[0],
+            "time": now.time,
+            **{f"{name}_energy": value for name, value in now.energy._asdict().items()},
+            "front": measures.front(x) + now.origin[0],
             **dict(zip((f"centre_{axis}" for axis in AXES), centre, strict=False)),
-            "max_speed": float(np.linalg.norm(v, axis=1).max(initial=0.0)),
-            **self._shares(level),
-            "particle_updates": sim.statistics["particle_updates"],
-            **self._flows(),
+            "max_speed": now.max_speed,
+            **_shares(now),
+            "particle_updates": now.particle_updates,
+            **({} if now.inflow is None else {"inflow": now.inflow}),
+            **{f"outlet_{number}": mass for number, mass in enumerate(now.outflows)},
             **{f"pressure_{name}": value for name, value in zip(probes.names(scene.probes), pressures, strict=True)},
             **{f"height_{name}": value for name, value in zip(probes.names(scene.gauges), heights, strict=True)},
             **{
                 f"force_{face}": value
-                for face, value in zip(self.forces.faces, self.forces.at(sim.time, x, rho, p), strict=True)
+                for face, value in zip(self.forces.faces, self.forces.at(now.time, x, now.densities, p), strict=True)
             },
         }
 
-    def _flows(self) -> dict[str, float]:
-        sim = self.sim
-        inflow = {"inflow": sim.medium.mass * sim.inflows.entered} if sim.inflows else {}
-        removed = sim.outlets.removed if sim.outlets else []
-        return inflow | {f"outlet_{number}": sim.medium.mass * n for number, n in enumerate(removed)}
 
-    def _shares(self, level: np.ndarray) -> dict[str, float]:
-        schedule = self.sim.schedule
-        shares = np.bincount(level, minlength=schedule.levels + 1)[1:] / max(1, len(level))
-        first = 2 ** np.arange(schedule.levels.bit_length()) if schedule.levels_double else np.arange(len(shares)) + 1
-        sums = np.add.reduceat(shares, first - 1)
-        return {f"level_{n}": float(share) for n, share in zip(first, sums, strict=True)}
+def _shares(now: Reading) -> dict[str, float]:
+    """Share of the particles by level, or by octave where levels double."""
+    count, shares = now.level_count, now.level_shares
+    first = 2 ** np.arange(count.bit_length()) if now.levels_double else np.arange(len(shares)) + 1
+    sums = np.add.reduceat(shares, first - 1)
+    return {f"level_{n}": float(share) for n, share in zip(first, sums, strict=True)}
 
 
 def append(path: Path, line: bytes) -> None:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.device.counts import CELLS_PER_BLOCK
-from taichi_rts.simulation import Simulation
+from taichi_rts.readings.reading import Readable, Reading
+from taichi_rts.scene.placing import placed
 from taichi_rts.solver.motion.motion import RUNAWAY_ACCELERATION, RUNAWAY_SPEED
 from taichi_rts.solver.stepping import criteria
 
@@ -54,17 +55,18 @@ class Diagnosis:
         )
 
 
-def diagnose(sim: Simulation) -> Diagnosis | None:
+def diagnose(state: Readable) -> Diagnosis | None:
     """Find the particle that is worst off in a run that has blown up, or return None for one that has not.
 
-    It reads the present state, so it says most when called soon after things went wrong.
+    `state` is a `Reading`, or a `Simulation`, whose present state is then read: it says most soon after things went wrong.
     """
-    x, v, rho, levels = (np.asarray(values, dtype=np.float64) for values in sim.local_state())
-    ratio = rho / sim.medium.rest_density
+    now = state.read()
+    x, v, rho = (np.asarray(a, dtype=np.float64) for a in (now.local_positions, now.velocities, now.densities))
+    ratio = rho / now.medium.rest_density
     thin = LEAST_DENSITY / np.maximum(ratio, 1e-30)
     if (
-        not int(sim.motion.runaways)
-        and not int(sim.motion.not_finite)
+        not now.runaways
+        and not now.not_finite
         and np.isfinite(x).all()
         and np.isfinite(v).all()
         and (ratio <= MOST_DENSITY).all()
@@ -72,57 +74,56 @@ def diagnose(sim: Simulation) -> Diagnosis | None:
     ):
         return None
     finite = np.isfinite(x).all(axis=1) & np.isfinite(v).all(axis=1) & np.isfinite(rho)
-    c, r = sim.medium.sound_speed, sim.medium.support
-    a = sim.particles.to_numpy(sim.particles.a).astype(np.float64)
+    c, r = now.medium.sound_speed, now.medium.support
+    a = now.accelerations.astype(np.float64)
     speed, acceleration = np.linalg.norm(v, axis=1), np.linalg.norm(a, axis=1)
     limits = (RUNAWAY_SPEED * c, RUNAWAY_ACCELERATION * c * c / r, MOST_DENSITY)
     shares = np.stack([speed / limits[0], acceleration / limits[1], np.maximum(ratio / limits[2], thin)])
     shares[:, ~finite] = np.inf
     shares = np.where(np.isnan(shares), np.inf, shares)
     particle = int(shares.max(axis=0).argmax())
-    steps = sim.steps()
-    cause, remedy = _cause(sim, speed[finite], float(steps.max()) * c / r)
+    cause, remedy = _cause(now, speed[finite], float(now.steps.max()) * c / r)
     return Diagnosis(
-        time=sim.time,
+        time=now.time,
         particle=particle,
-        position=tuple(sim.placed(x[particle])),
+        position=tuple(placed(now.scene, x[particle])),
         velocity=tuple(v[particle]),
-        level=int(levels[particle]),
-        step=float(steps[particle]),
-        exceeded=_exceeded(sim, particle, shares[:, particle], speed, acceleration, rho),
+        level=int(now.levels[particle]),
+        step=float(now.steps[particle]),
+        exceeded=_exceeded(now, particle, shares[:, particle], speed, acceleration, rho),
         cause=cause,
         remedy=remedy,
-        criteria=_criteria(sim, x, particle, speed, acceleration),
+        criteria=_criteria(now, x, particle, speed, acceleration),
     )
 
 
-def _criteria(sim: Simulation, x: np.ndarray, particle: int, speed: np.ndarray, acceleration: np.ndarray) -> str:
+def _criteria(now: Reading, x: np.ndarray, particle: int, speed: np.ndarray, acceleration: np.ndarray) -> str:
     """Return what limits the step in the particle's block, in one sentence."""
-    geometry, c, r = sim.grid.geometry, sim.medium.sound_speed, sim.medium.support
-    inside = np.clip(np.nan_to_num(x), sim.local.domain.lower, sim.local.domain.upper)
+    geometry, c, r = now.geometry, now.medium.sound_speed, now.medium.support
+    inside = np.clip(np.nan_to_num(x), now.local.domain.lower, now.local.domain.upper)
     blocks = geometry.cell_numpy(inside) // CELLS_PER_BLOCK
     mates = blocks == blocks[particle]
     v, a = (float(values[mates & np.isfinite(values)].max(initial=0.0)) for values in (speed, acceleration))
-    lambda_f = getattr(sim.stepper, "lambda_f", None) or PAPERS_LAMBDA_F
+    lambda_f = getattr(now.stepper, "lambda_f", None) or PAPERS_LAMBDA_F
     allowed = {
         f"{LARGE_COURANT:g} r/(c_s + |v|)": criteria.acoustic_step(LARGE_COURANT, r, c + v),
         f"{lambda_f:g} sqrt(r/|a|)": criteria.force_step(lambda_f, r, a),
-        "viscosity": criteria.scene_viscous_step(sim.scene),
+        "viscosity": criteria.scene_viscous_step(now.scene),
     }
     steps = ", ".join(f"{name} {1e3 * step:.3g} ms" for name, step in allowed.items() if np.isfinite(step))
     extremes = f"|v| up to {v:.3g} m/s, |a| up to {a:.3g} m/s^2"
     return f"Its block: {int(mates.sum())} particles, {extremes}, which allow steps of {steps}. "
 
 
-def _exceeded(sim: Simulation, i: int, shares: Any, speed: Any, acceleration: Any, rho: Any) -> str:
-    c, r = sim.medium.sound_speed, sim.medium.support
+def _exceeded(now: Reading, i: int, shares: Any, speed: Any, acceleration: Any, rho: Any) -> str:
+    c, r = now.medium.sound_speed, now.medium.support
     if not np.isfinite(shares).all():
         return "its state is not a finite number"
-    density = f"density {rho[i] / sim.medium.rest_density:.3g} of rest"
+    density = f"density {rho[i] / now.medium.rest_density:.3g} of rest"
     if shares[2] >= max(1.0, *shares[:2]):
         return f"{density} is not between {LEAST_DENSITY:g} and {MOST_DENSITY:g}"
     if shares[:2].max() < AT_LIMIT:
-        count = sim.statistics["runaways"]
+        count = now.runaways
         return f"speed {speed[i]:.3g} m/s = {speed[i] / c:.2g} c_s, {density}; {count:,} earlier values were limited"
     if shares[0] >= AT_LIMIT:
         return f"speed {speed[i]:.3g} m/s reaches the limit of {RUNAWAY_SPEED:g} c_s = {RUNAWAY_SPEED * c:.3g} m/s, {density}"
@@ -133,9 +134,9 @@ def _exceeded(sim: Simulation, i: int, shares: Any, speed: Any, acceleration: An
     )
 
 
-def _cause(sim: Simulation, speed: np.ndarray, courant: float) -> tuple[str, str]:
+def _cause(now: Reading, speed: np.ndarray, courant: float) -> tuple[str, str]:
     """Return the likely cause and its remedy, `courant` being that of the longest step in use."""
-    c, expected = sim.medium.sound_speed, sim.scene.estimate_max_speed()
+    c, expected = now.medium.sound_speed, now.scene.estimate_max_speed()
     slower = f"a smaller courant (the longest step is {courant:.3g} r/c_s now)"
     if expected > STRONG_MACH * c:
         faster = f"a larger sound_speed (now {c:.3g} m/s; ten times the largest speed is {10 * expected:.3g} m/s)"

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
-import numpy as np
-
-from taichi_rts.simulation import Simulation
+from taichi_rts.medium.medium import Medium
+from taichi_rts.readings.reading import Readable
 
 DENSE = 1.03
 """Density over rest above which water counts as compressed: three times the 1 % that sound speeds aim at."""
@@ -18,10 +17,17 @@ MOST_DENSE = 0.25
 """Share of particles above `DENSE` that says the same; a splash presses a few together for a moment."""
 
 
+class Run(Readable, Protocol):
+    """What is looked at: a `Simulation`, or what stands in for it."""
+
+    medium: Medium
+    sound: Any
+
+
 class Extremes:
     """Looks at runs at their frames and keeps the largest local Mach number |v_i|/c_i and the largest density over rest."""
 
-    def __init__(self, runs: Mapping[Any, Simulation]) -> None:
+    def __init__(self, runs: Mapping[Any, Run]) -> None:
         self.runs = runs
         self.mach = dict.fromkeys(runs, 0.0)
         self.density = dict.fromkeys(runs, 0.0)
@@ -29,11 +35,10 @@ class Extremes:
 
     def look(self) -> None:
         """Take note of the present states."""
-        for key, sim in self.runs.items():
-            _x, v, rho, _level = sim.state()
-            mach = np.linalg.norm(v, axis=1) / sim.sound_speeds()
-            ratio = rho / sim.medium.rest_density
-            self.mach[key] = max(self.mach[key], float(mach.max(initial=0.0)))
+        for key, run in self.runs.items():
+            now = run.read()
+            ratio = now.density_ratios
+            self.mach[key] = max(self.mach[key], now.max_mach)
             self.density[key] = max(self.density[key], float(ratio.max(initial=0.0)))
             self.dense[key] = max(self.dense[key], float((ratio > DENSE).sum()) / max(1, len(ratio)))
 
@@ -61,9 +66,9 @@ class Extremes:
         return [("largest local Mach number", mach), ("largest density", density)]
 
     def _remedy(self, key: Any) -> str:
-        sim = self.runs[key]
-        if sim.sound is not None:
+        run = self.runs[key]
+        if run.sound is not None:
             return "give --sound-speed a number, ten times the largest speed"
-        c = sim.medium.sound_speed
+        c = run.medium.sound_speed
         wanted = c * max(2.0, 10.0 * self.mach[key])
         return f"use --sound-speed {wanted:.2g} (now {c:.3g} m/s), ten times the largest speed"

@@ -1,21 +1,9 @@
-"""What a run's levels mean to a reader: longest steps, octaves, and which levels are shown as one."""
+"""What levels mean to a reader: octaves, and which levels are shown as one."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-
-from taichi_rts.simulation import Simulation
-
-
-def longest_step(sim: Simulation) -> float:
-    """The longest step [s] that the stepper can take."""
-    return sim.schedule.levels * sim.base_step
-
-
-def longest_lead(sim: Simulation) -> float:
-    """Longest time [s] by which a cell can be ahead of the youngest: it begins its last step at most one step ahead."""
-    return (2 if sim.schedule.levels_double else 1) * longest_step(sim)
 
 
 def milliseconds(time: float) -> str:

@@ -1,5 +1,9 @@
 """From levels and fields to colours (sRGB, 0 to 1), in NumPy only."""
 
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any
+
 import numpy as np
 from PIL import ImageColor
 
@@ -7,6 +11,7 @@ from taichi_rts.errors import RenderError
 from taichi_rts.readings.levels import octaves
 
 PLAIN = (0.22, 0.50, 0.80)  # water
+LEAST_TOP = 1e-12  # of a range from 0, where all is 0
 
 
 def _rgb(*codes: str) -> np.ndarray:
@@ -63,38 +68,33 @@ def scalar_colours(values, lower: float, upper: float, colormap: str = "lagoon")
     return colours
 
 
-def _needed(mode: str, name: str, values):
-    if values is None:
-        raise RenderError(f"colour mode {mode!r} needs {name}, got None: pass {name}= or choose another mode")
-    return np.asarray(values)
+@dataclasses.dataclass(frozen=True)
+class Scale:
+    """What colours are chosen by besides the values themselves.
 
+    Attributes:
+        palette: of levels and fluids.
+        doubling: whether an octave of levels shares a colour.
+        tops: the upper end of a mode's range, by its name, in its unit; where there is none it is the largest value.
+        rest_density: [kg/m^3], in the middle of mode "density".
+        fluid_names: colours of the fluids, as `fluid_colours` takes them.
+    """
 
-def _by_level(levels, palette, doubling, **_):
-    return level_colours(_needed("level", "levels", levels), palette, doubling=doubling)
+    palette: str = "default"
+    doubling: bool = False
+    tops: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    rest_density: float = 1000.0
+    fluid_names: tuple[str | None, ...] = ()
 
-
-def _by_speed(speeds, max_speed, **_):
-    speeds = _needed("speed", "speeds", speeds)
-    return scalar_colours(speeds, *speed_range(speeds, max_speed))
-
-
-def _by_density(densities, rest_density, **_):
-    return scalar_colours(_needed("density", "densities", densities), *density_range(rest_density), "balance")
-
-
-def _by_step(steps, longest_step, **_):
-    steps = _needed("step", "steps", steps)
-    return scalar_colours(steps, *step_range(steps, longest_step))
-
-
-def _by_lead(leads, longest_step, **_):
-    leads = _needed("lead", "leads", leads)
-    return scalar_colours(leads, *step_range(leads, longest_step))
-
-
-def _by_sound(sounds, top_sound, **_):
-    sounds = _needed("sound", "sounds", sounds)
-    return scalar_colours(sounds, *sound_range(sounds, top_sound))
+    def ends(self, mode: str, values=()) -> tuple[float, float]:
+        """Return the range that a mode of scalars shows, in its unit: 5 % on either side of rest, or from 0."""
+        if mode == "density":
+            return 0.95 * self.rest_density, 1.05 * self.rest_density
+        top = self.tops.get(mode)
+        if top is None:
+            finite = np.asarray(values)[np.isfinite(values)]
+            top = float(finite.max()) if finite.size else 1.0
+        return 0.0, max(float(top), LEAST_TOP)
 
 
 def fluid_colours(names, palette: str = "default") -> np.ndarray:
@@ -104,115 +104,40 @@ def fluid_colours(names, palette: str = "default") -> np.ndarray:
     return np.array([one if chosen is None else chosen for one, chosen in zip(own, given, strict=True)])
 
 
-def _by_fluid(fluids, fluid_tints, **_):
-    return _needed("fluid", "fluid_tints", fluid_tints)[_needed("fluid", "fluids", fluids)]
+def _by_level(values, scale: Scale) -> np.ndarray:
+    return level_colours(values, scale.palette, doubling=scale.doubling)
 
 
-def _by_pressure(pressures, top_pressure, **_):
-    pressures = _needed("pressure", "pressures", pressures)
-    return scalar_colours(pressures, *pressure_range(pressures, top_pressure))
+def _by_fluid(values, scale: Scale) -> np.ndarray:
+    return fluid_colours(scale.fluid_names, scale.palette)[values]
 
 
-def _plain(count, **_):
-    return np.tile(np.asarray(PLAIN, np.float32), (count, 1))
+def _plain(values, scale: Scale) -> np.ndarray:
+    return np.tile(np.asarray(PLAIN, np.float32), (len(values), 1))
 
 
-_MODES = {
+def _scalar(mode: str, colormap: str = "lagoon") -> Callable[[Any, Scale], np.ndarray]:
+    return lambda values, scale: scalar_colours(values, *scale.ends(mode, values), colormap)
+
+
+_MODES: dict[str, Callable[[Any, Scale], np.ndarray]] = {
     "level": _by_level,
-    "step": _by_step,
-    "lead": _by_lead,
-    "speed": _by_speed,
-    "density": _by_density,
-    "sound": _by_sound,
+    "step": _scalar("step"),
+    "lead": _scalar("lead"),
+    "speed": _scalar("speed"),
+    "density": _scalar("density", "balance"),
+    "sound": _scalar("sound"),
     "fluid": _by_fluid,
-    "pressure": _by_pressure,
+    "pressure": _scalar("pressure"),
     "plain": _plain,
 }
 MODES = tuple(_MODES)
 
 
-def speed_range(speeds, max_speed: float | None) -> tuple[float, float]:
-    """Return the range that mode "speed" shows [m/s]."""
-    return 0.0, _upper(speeds, max_speed)
+def colour_by(mode: str, values, scale: Scale = Scale()) -> np.ndarray:
+    """Return (N, 3) float32 colours of `values`, (N,); `mode` is one of `MODES` and says what they are.
 
-
-def sound_range(sounds, top_sound: float | None) -> tuple[float, float]:
-    """Return the range that mode "sound" shows [m/s]."""
-    return 0.0, _upper(sounds, top_sound)
-
-
-def pressure_range(pressures, top_pressure: float | None) -> tuple[float, float]:
-    """Return the range that mode "pressure" shows [Pa]."""
-    return 0.0, _upper(pressures, top_pressure)
-
-
-def step_range(steps, longest_step: float | None) -> tuple[float, float]:
-    """Return the range that modes "step" and "lead" show [s]."""
-    return 0.0, _upper(steps, longest_step)
-
-
-def _upper(values, given: float | None) -> float:
-    """Upper end of a range from 0: as given, else the largest value."""
-    if given is None:
-        finite = np.asarray(values)[np.isfinite(values)]
-        given = float(finite.max()) if finite.size else 1.0
-    return max(float(given), 1e-12)
-
-
-def density_range(rest_density: float) -> tuple[float, float]:
-    """Return the range that mode "density" shows [kg/m^3]: 5 % on either side of rest."""
-    return 0.95 * rest_density, 1.05 * rest_density
-
-
-def colour_by(
-    mode: str,
-    *,
-    levels=None,
-    speeds=None,
-    densities=None,
-    steps=None,
-    leads=None,
-    sounds=None,
-    fluids=None,
-    fluid_tints=None,
-    pressures=None,
-    rest_density: float = 1000.0,
-    max_speed: float | None = None,
-    longest_step: float | None = None,
-    top_sound: float | None = None,
-    top_pressure: float | None = None,
-    palette: str = "default",
-    doubling: bool = False,
-) -> np.ndarray:
-    """Return (N, 3) float32 colours; `mode` is one of `MODES`.
-
-    Units: speeds, sounds [m/s], densities [kg/m^3], steps, leads [s], pressures [Pa]. `fluids` are the places, (N,), of
-    particles' colours in `fluid_tints`, (K, 3).
+    Levels, steps and leads [s], speeds and sound speeds [m/s], densities [kg/m^3], pressures [Pa], places of fluids in the
+    scene; for "plain" only their number counts. Raises `RenderError` for an unknown mode.
     """
-    choose = _choose("colour mode", mode, _MODES)
-    arrays = (levels, speeds, densities, steps, leads, sounds, fluids, pressures)
-    given = [values for values in arrays if values is not None]
-    if not given:
-        raise RenderError(
-            f"colour mode {mode!r} got no array, and needs at least one to know the number of particles: "
-            "pass levels=, speeds=, densities=, steps=, leads=, sounds=, fluids= or pressures="
-        )
-    return choose(
-        levels=levels,
-        speeds=speeds,
-        densities=densities,
-        steps=steps,
-        leads=leads,
-        sounds=sounds,
-        fluids=fluids,
-        fluid_tints=fluid_tints,
-        pressures=pressures,
-        rest_density=rest_density,
-        max_speed=max_speed,
-        longest_step=longest_step,
-        top_sound=top_sound,
-        top_pressure=top_pressure,
-        palette=palette,
-        doubling=doubling,
-        count=len(given[0]),
-    )
+    return _choose("colour mode", mode, _MODES)(np.asarray(values), scale)

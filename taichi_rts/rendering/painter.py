@@ -1,4 +1,4 @@
-"""From a simulation to a finished picture: colours, renderer, legend."""
+"""From a reading to a finished picture: colours, renderer, legend."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from typing import Any, Literal
 import numpy as np
 
 from taichi_rts.errors import RenderError
-from taichi_rts.readings.levels import level_classes, longest_lead, longest_step, milliseconds
+from taichi_rts.readings.levels import level_classes, milliseconds
+from taichi_rts.readings.reading import Readable, Reading
 from taichi_rts.rendering import colours, legend
 from taichi_rts.rendering.camera import Camera
 from taichi_rts.rendering.obstacles import ObstaclePoints
 from taichi_rts.rendering.splatter import Splatter
+from taichi_rts.rendering.tints import Tints
 from taichi_rts.scene.placing import at_origin
 from taichi_rts.scene.scene import Scene
-from taichi_rts.simulation import Simulation
 
 Mode = Literal["level", "step", "lead", "speed", "density", "sound", "fluid", "pressure", "plain"]
 View = Literal["scene", "front", "side", "top"]
@@ -23,7 +24,7 @@ VIEWS: dict[str, tuple[float, float]] = {"front": (0.0, 0.0), "side": (90.0, 0.0
 """Azimuth and elevation [degrees] of the views without perspective; straight down, there would be no right."""
 MOST_VIEWS = 4
 BAR_STEPS = 64
-LEGEND_ROWS = 8  # with more levels than that the legend leaves out those that nobody has
+LEGEND_ROWS = 8  # with more levels than that the legend leaves out those that no particle has
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,7 @@ def make_camera(scene: Scene, options: PictureOptions, name: View = "scene") -> 
 
 
 class Painter:
-    """Paints one simulation's present state again and again with the same options."""
+    """Paints states of one scene again and again with the same options."""
 
     def __init__(self, scene: Scene, options: PictureOptions, title: str = "", renderer: Any = None) -> None:
         self.scene = scene = at_origin(scene)  # pictures are drawn in single precision
@@ -113,18 +114,20 @@ class Painter:
         self.renderer = renderer if renderer is not None else make_renderer(options)
         self.cameras = make_cameras(scene, options)
         self.obstacles = ObstaclePoints(scene, 0.5 * scene.spacing)
-        self.top_speed = scene.estimate_max_speed()
-        self.top_pressure = 0.5 * scene.rest_density * self.top_speed**2
+        self.tints = Tints(scene)
 
-    def paint(self, sim: Simulation) -> np.ndarray:
-        """Return the picture of `sim` at its present time, (height, width, 3) uint8, or 4 if it is transparent."""
-        x, v, rho, level = sim.local_state()
-        tints = self.colours(sim, v, rho, level)
+    def paint(self, state: Readable) -> np.ndarray:
+        """Return the picture of a `Reading`, or of a `Simulation` as it is now.
+
+        It is (height, width, 3) uint8, or (height, width, 4) if it is transparent.
+        """
+        now = state.read()
+        tints = self.tints.of(now, self.options.colour_by, self.options.palette)
         outline = (self.scene.domain.lower, self.scene.domain.upper)
-        x, tints = self.obstacles.add(x, tints, sim.time)
+        x, tints = self.obstacles.add(now.local_positions, tints, now.time)
         images = [self.renderer.draw(x, tints, 0.5 * self.scene.spacing, each, outline) for each in self.cameras]
         image = self._joined(images) if len(images) > 1 else images[0]
-        return self._label(image, sim, level) if self.options.legend else image
+        return self._label(image, now) if self.options.legend else image
 
     def _joined(self, images: list[np.ndarray]) -> np.ndarray:
         """Return all views in one picture, each with its name."""
@@ -133,100 +136,46 @@ class Painter:
             images = [legend.draw_legend(image, name, [], position="bottom-left") for image, name in named]
         return legend.hstack_panels(images)
 
-    def colours(self, sim: Simulation, v: np.ndarray, rho: np.ndarray, level: np.ndarray) -> np.ndarray:
-        """Colours (N, 3) of the particles of `sim`, whose velocities `v`, densities `rho` and levels these are."""
+    def _label(self, image: np.ndarray, now: Reading) -> np.ndarray:
         mode = self.options.colour_by
-        return colours.colour_by(
-            mode,
-            levels=level,
-            speeds=np.linalg.norm(v, axis=1),
-            densities=rho,
-            steps=sim.steps() if mode == "step" else None,
-            leads=sim.leads() if mode == "lead" else None,
-            sounds=sim.sound_speeds() if mode == "sound" else None,
-            fluids=sim.fluids() if mode == "fluid" else None,
-            fluid_tints=self._fluid_tints() if mode == "fluid" else None,
-            pressures=sim.medium.equation_of_state.pressure_numpy(rho) if mode == "pressure" else None,
-            rest_density=self.scene.rest_density,
-            max_speed=self.top_speed,
-            longest_step=longest_lead(sim) if mode == "lead" else longest_step(sim),
-            top_sound=self.scene.viscous_wave_speed,
-            top_pressure=self.top_pressure,
-            palette=self.options.palette,
-            doubling=sim.schedule.levels_double,
-        )
+        lines = [f"t = {now.time:.3f} s", f"Δt_b = {milliseconds(now.base_step)} ms", f"{now.count:,} particles"]
+        image = legend.draw_legend(image, self.title, self._entries(now), lines)
+        if mode not in BARS:
+            return image
+        title, unit, factor = BARS[mode]
+        scale = self.tints.scale(now, self.options.palette)
+        lower, upper = scale.ends(mode)
+        tints = colours.colour_by(mode, np.linspace(lower, upper, BAR_STEPS), scale)
+        upper = upper if upper > colours.LEAST_TOP else 0.0
+        return legend.draw_colour_bar(image, title, factor * lower, factor * upper, unit, tints)
 
-    def _fluid_tints(self) -> np.ndarray:
-        return colours.fluid_colours(self.scene.fluid_colours, self.options.palette)
-
-    def _label(self, image: np.ndarray, sim: Simulation, level: np.ndarray) -> np.ndarray:
-        lines = [f"t = {sim.time:.3f} s", f"Δt_b = {milliseconds(sim.base_step)} ms", f"{sim.count:,} particles"]
-        entries = self._entries(sim, level) if self.options.colour_by in ("level", "fluid") else []
-        image = legend.draw_legend(image, self.title, entries, lines)
-        bar = _BARS.get(self.options.colour_by)
-        return bar(self, image, sim) if bar else image
-
-    def _entries(self, sim: Simulation, level: np.ndarray) -> list[tuple[str, Any, float]]:
-        """One entry a colour of levels or fluids, with the share of particles that have it now."""
+    def _entries(self, now: Reading) -> list[tuple[str, Any, float]]:
+        """One entry a colour of levels or fluids, with the share of particles that have it now; none in other modes."""
+        palette = self.options.palette
         if self.options.colour_by == "fluid":
-            tints = self._fluid_tints()
-            counts = np.bincount(sim.fluids(), minlength=len(tints)) / max(1, sim.count)
+            tints = colours.fluid_colours(self.scene.fluid_colours, palette)
+            counts = np.bincount(now.fluids, minlength=len(tints)) / max(1, now.count)
             return [
                 (name, tuple(t), share) for name, t, share in zip(self.scene.fluid_names, tints, counts, strict=True)
             ]
-        shares = np.bincount(level, minlength=sim.schedule.levels + 1)[1:] / max(1, len(level))
-        classes = level_classes(shares, sim.schedule.levels_double)
-        if sim.schedule.levels_double and len(classes) > LEGEND_ROWS:
+        if self.options.colour_by != "level":
+            return []
+        classes = level_classes(now.level_shares, now.levels_double)
+        if now.levels_double and len(classes) > LEGEND_ROWS:
             classes = [each for each in classes if each.share > 0.0]
-        tints = colours.level_colours(
-            [each.first for each in classes], self.options.palette, doubling=sim.schedule.levels_double
-        )
+        tints = colours.level_colours([each.first for each in classes], palette, doubling=now.levels_double)
         return [
             (f"level {each}: {each} Δt_b" if each.last > 1 else "level 1: Δt_b", tuple(tint), each.share)
             for each, tint in zip(classes, tints, strict=True)
         ]
 
-    def _step_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
-        return self._milliseconds_bar(image, "step", longest_step(sim))
 
-    def _lead_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
-        return self._milliseconds_bar(image, "ahead of the youngest", longest_lead(sim))
-
-    def _milliseconds_bar(self, image: np.ndarray, title: str, longest: float) -> np.ndarray:
-        lower, upper = colours.step_range([], longest)
-        values = np.linspace(lower, upper, BAR_STEPS)
-        tints = colours.colour_by("step", steps=values, longest_step=upper)
-        return legend.draw_colour_bar(image, title, 1e3 * lower, 1e3 * upper, "ms", tints)
-
-    def _speed_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
-        values = np.linspace(0.0, self.top_speed, BAR_STEPS)
-        tints = colours.colour_by("speed", speeds=values, max_speed=self.top_speed)
-        return legend.draw_colour_bar(image, "speed", 0.0, self.top_speed, "m/s", tints)
-
-    def _sound_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
-        lower, upper = colours.sound_range([], self.scene.viscous_wave_speed)
-        values = np.linspace(lower, upper, BAR_STEPS)
-        tints = colours.colour_by("sound", sounds=values, top_sound=upper)
-        return legend.draw_colour_bar(image, "sound speed", lower, upper, "m/s", tints)
-
-    def _pressure_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
-        lower, upper = colours.pressure_range([], self.top_pressure)
-        values = np.linspace(lower, upper, BAR_STEPS)
-        tints = colours.colour_by("pressure", pressures=values, top_pressure=upper)
-        return legend.draw_colour_bar(image, "pressure", 1e-3 * lower, 1e-3 * upper, "kPa", tints)
-
-    def _density_bar(self, image: np.ndarray, sim: Simulation) -> np.ndarray:
-        lower, upper = colours.density_range(self.scene.rest_density)
-        values = np.linspace(lower, upper, BAR_STEPS)
-        tints = colours.colour_by("density", densities=values, rest_density=self.scene.rest_density)
-        return legend.draw_colour_bar(image, "density", lower, upper, "kg/m^3", tints)
-
-
-_BARS = {
-    "step": Painter._step_bar,
-    "lead": Painter._lead_bar,
-    "speed": Painter._speed_bar,
-    "density": Painter._density_bar,
-    "sound": Painter._sound_bar,
-    "pressure": Painter._pressure_bar,
+BARS: dict[str, tuple[str, str, float]] = {
+    "step": ("step", "ms", 1e3),
+    "lead": ("ahead of the youngest", "ms", 1e3),
+    "speed": ("speed", "m/s", 1.0),
+    "density": ("density", "kg/m^3", 1.0),
+    "sound": ("sound speed", "m/s", 1.0),
+    "pressure": ("pressure", "kPa", 1e-3),
 }
+"""Modes that have a bar of colours: its title, its unit, and how many of them the SI unit is."""

@@ -6,6 +6,8 @@ import copy
 import dataclasses
 from typing import Any
 
+import numpy as np
+
 from taichi_rts.scene.parts.conditions import Inflow, Outlet
 from taichi_rts.scene.parts.obstacles import (
     BoxObstacle,
@@ -54,6 +56,14 @@ def at_origin(scene: Scene) -> Scene:
     """Return `scene` with its coordinates counted from `origin_of` it; the same object where that is 0."""
     origin = origin_of(scene)
     return translated(scene, tuple(-x for x in origin)) if any(origin) else scene
+
+
+def placed(scene: Scene, x: np.ndarray) -> np.ndarray:
+    """Positions `x` [m], (..., dim), counted from `origin_of` it, as `scene` counts: in double precision unless that is 0."""
+    origin = origin_of(scene)
+    if not any(origin):
+        return x
+    return np.clip(x + np.asarray(origin), scene.domain.lower, scene.domain.upper)
 
 
 def translated(thing: Any, shift: Vector) -> Any:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.errors import Error, SimulationDivergedError
+from taichi_rts.readings.reading import Reading
 from taichi_rts.scene.parts.conditions import face_axis
 from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
@@ -103,7 +104,8 @@ def watch(
             sim.advance_to(time)
         except SimulationDivergedError as error:
             return watcher.outcome(str(error).partition(";")[0])
-        if reason := watcher.look():
+        now = sim.read()  # held while `on_sample` looks at it too
+        if reason := watcher.look(now):
             return watcher.outcome(reason)
         if on_sample is not None:
             on_sample(sim)
@@ -210,11 +212,11 @@ class _Watcher:
         self.energy = -math.inf
         self.runaways = 0
 
-    def look(self) -> str:
-        """Return the first violation at the present time, or nothing."""
+    def look(self, now: Reading) -> str:
+        """Return the first violation of the present state, or nothing."""
         sim = self.sim
-        x, v, rho, _ = sim.state()
-        self.runaways = sim.statistics["runaways"]
+        x, v, rho = now.positions, now.velocities, now.densities
+        self.runaways = now.runaways
         at = f"at t = {sim.time:.4g} s"
         finite = np.isfinite(x).all() and np.isfinite(v).all() and np.isfinite(rho).all()
         if not finite:
@@ -222,10 +224,10 @@ class _Watcher:
         density = float(rho.max()) / sim.medium.rest_density
         self.density = max(self.density, density)
         self.speed = max(self.speed, float(np.linalg.norm(v.astype(np.float64), axis=1).max()))
-        self.courant = max(self.courant, float(sim.steps().max()) * sim.scene.least_wave_speed / sim.medium.support)
+        self.courant = max(self.courant, float(now.steps.max()) * sim.scene.least_wave_speed / sim.medium.support)
         work = sim.work()
         scale = energy_scale(sim, self.start, work)
-        gain = (sim.energy().total - work - self.start) / scale
+        gain = (now.energy.total - work - self.start) / scale
         self.energy = max(self.energy, 1.0 + gain)
         if self.runaways:
             return f"{self.runaways} speeds or accelerations limited {at}"

@@ -108,7 +108,7 @@ class Panel:
             session.wanted = dataclasses.replace(wanted, levels=levels, courant=courant, viscosity=viscosity)
             if panel.button("apply (Return)"):
                 session.press("Return")
-            if panel.button(f"palette: {session.painter.options.palette}"):
+            if panel.button(f"palette: {session.options.palette}"):
                 session.press("p")
             panel.text("lower right: shares over time")
             for line in _wrapped(session.message):
@@ -132,7 +132,7 @@ def share_plot(session: LiveSession, columns: int, rows: int) -> tuple[np.ndarra
     shades = [np.tile(BACKGROUND, (len(corners[0]), 1))]
     classes = session.classes()
     doubling = session.sim.schedule.levels_double
-    tints = colours.level_colours([each.first for each in classes], session.painter.options.palette, doubling=doubling)
+    tints = colours.level_colours([each.first for each in classes], session.options.palette, doubling=doubling)
     shares = np.array([each for each in session.history if len(each) == len(classes)]).reshape(-1, len(classes))
     tops = np.cumsum(shares, axis=1)
     left = HISTORY - len(shares) + np.arange(len(shares))

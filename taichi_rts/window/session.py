@@ -10,15 +10,18 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from taichi_rts.assembly.handover import Snapshot, hand_over
 from taichi_rts.errors import CheckpointError, Error
 from taichi_rts.files.archive import open_archive
+from taichi_rts.output.change_stepper import hand_over
 from taichi_rts.output.checkpoint import Checkpoint, differences, save_checkpoint
 from taichi_rts.output.resume import checkpoint_name
 from taichi_rts.readings.levels import level_classes, milliseconds
 from taichi_rts.rendering import colours
-from taichi_rts.rendering.painter import Painter, PictureOptions
+from taichi_rts.rendering.obstacles import ObstaclePoints
+from taichi_rts.rendering.painter import PictureOptions, make_cameras
+from taichi_rts.rendering.tints import Tints
 from taichi_rts.scene.parts.conditions import AXES
+from taichi_rts.scene.placing import at_origin
 from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
 from taichi_rts.solver.stepping.steppers import STEPPERS
@@ -61,7 +64,11 @@ class LiveSession:
         self.scene = scene
         self.folder = folder / "window"
         self.stepper = stepper
-        self.painter = Painter(scene, options, renderer=self)  # for its colours only
+        make_cameras(scene, options)  # which refuses what the scene does not have
+        self.options = options
+        local = at_origin(scene)
+        self.tints = Tints(local)
+        self.obstacles = ObstaclePoints(local, 0.5 * scene.spacing)
         self.paused = self.helps = self.over = False
         self.clip_axis, self.clip_share = -1, 0.5
         self.scale = 1.0
@@ -73,7 +80,7 @@ class LiveSession:
         self.last_state: Path | None = None
         self._runs: dict[Any, Simulation] = {}
         self.sim = self._run(stepper, scene.kinematic_viscosity)
-        self.start = Snapshot.of(self.sim)
+        self.start = self.sim.snapshot()
         self.initial_energy = self.sim.energy().total
         self.wanted = self.settings
         self._last_work = self._work()
@@ -102,6 +109,7 @@ class LiveSession:
 
     def note(self) -> None:
         """Take down what the plot and the panel show of the present state."""
+        self.now = self.sim.read()  # held, so that all that show this frame share it
         self.history.append(np.array([each.share for each in self.classes()]))
         work = self._work()
         updates, seconds, steps = (now - before for now, before in zip(work, self._last_work, strict=True))
@@ -115,9 +123,8 @@ class LiveSession:
 
     def classes(self) -> list[Any]:
         """Return the classes of levels with their present shares of particles."""
-        schedule, level = self.sim.schedule, self.sim.levels()
-        shares = np.bincount(level, minlength=schedule.levels + 1)[1:] / max(1, len(level))
-        return level_classes(shares, schedule.levels_double)
+        now = self.sim.read()
+        return level_classes(now.level_shares, now.levels_double)
 
     # -- settings ---------------------------------------------------------------------------------------------------
 
@@ -213,7 +220,7 @@ class LiveSession:
 
     def reset(self) -> None:
         """Go back to the scene's start, with the present stepper."""
-        self.start.put_into(self.sim)
+        self.sim.continue_from(self.start)
         self._change_to(self.sim)
 
     def next_colour(self) -> None:
@@ -225,15 +232,15 @@ class LiveSession:
     def next_palette(self) -> None:
         """Take the other colours of levels."""
         names = list(colours.PALETTES)
-        self._paint(palette=names[(names.index(self.painter.options.palette) + 1) % len(names)])
+        self._paint(palette=names[(names.index(self.options.palette) + 1) % len(names)])
 
     def _paint(self, **changes: Any) -> None:
-        self.painter.options = dataclasses.replace(self.painter.options, **changes)
+        self.options = dataclasses.replace(self.options, **changes)
 
     @property
     def mode(self) -> str:
         """What colours show."""
-        return self.painter.options.colour_by
+        return self.options.colour_by
 
     def next_clip(self) -> None:
         """Cut the picture open across the next axis, or not at all."""
@@ -278,7 +285,7 @@ class LiveSession:
     def record(self) -> None:
         """Begin a recording, or end it."""
         if self.film is None:
-            self.film = Film.begin(self.folder, self.painter.options.width, self.painter.options.height)
+            self.film = Film.begin(self.folder, self.options.width, self.options.height)
             self.message = f"recording into {self.film.folder}"
         else:
             self.message, self.film = self.film.close(), None
@@ -332,11 +339,11 @@ class LiveSession:
 
     def view(self) -> View:
         """Return the fluid and the obstacles as they are now, cut open at the clip plane."""
-        sim, radius = self.sim, 0.5 * self.scene.spacing * self.scale
-        x, v, rho, level = sim.local_state()
-        x, tints = self.painter.obstacles.add(x, self.painter.colours(sim, v, rho, level), sim.time)
+        now, radius = self.sim.read(), 0.5 * self.scene.spacing * self.scale
+        tints = self.tints.of(now, self.options.colour_by, self.options.palette)
+        x, tints = self.obstacles.add(now.local_positions, tints, now.time)
         if self.clip_axis >= 0:
-            box = sim.local.domain
+            box = now.local.domain
             low, high = box.lower[self.clip_axis], box.upper[self.clip_axis]
             kept = x[:, self.clip_axis] <= low + self.clip_share * (high - low)
             x, tints = x[kept], tints[kept]
@@ -345,7 +352,7 @@ class LiveSession:
     def entries(self) -> list[tuple[str, Any, float]]:
         """Return text, colour and share of each class of levels, as legends have them."""
         doubling, classes = self.sim.schedule.levels_double, self.classes()
-        tints = colours.level_colours([each.first for each in classes], self.painter.options.palette, doubling=doubling)
+        tints = colours.level_colours([each.first for each in classes], self.options.palette, doubling=doubling)
         return [(f"level {each}", tuple(tint), each.share) for each, tint in zip(classes, tints, strict=True)]
 
     def lines(self) -> list[str]:

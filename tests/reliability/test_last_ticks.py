@@ -5,7 +5,6 @@ import dataclasses
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.assembly.handover import Snapshot
 from taichi_rts.solver.stepping.timeline import MAX_TICKS
 
 TICKS = 72  # a multiple of all steps, as is `MAX_TICKS`: steps that are aligned then meet the same phase
@@ -24,10 +23,10 @@ TICKS = 72  # a multiple of all steps, as is `MAX_TICKS`: steps that are aligned
 )
 def test_the_last_ticks_are_like_the_first(simulate, stepper):
     sim = simulate(rts.load_scene("dam_break_2d", particles=100, end_time=0.1), stepper)
-    start, tick = Snapshot.of(sim), sim.timeline.tick
+    start, tick = sim.snapshot(), sim.timeline.tick
     states = []
     for begin in (0, MAX_TICKS - TICKS):
-        dataclasses.replace(start, time=begin * tick).put_into(sim)
+        sim.continue_from(dataclasses.replace(start, time=begin * tick))
         sim.advance_to((begin + TICKS) * tick)
         states.append([field.to_numpy() for field in (sim.particles.x, sim.particles.v, sim.particles.rho)])
     for first, last in zip(*states, strict=True):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.assembly.handover import change_stepper
 from taichi_rts.assembly.resources import require_resolution
 from taichi_rts.errors import ResourceError
 from taichi_rts.output.export import Exporter, capture
@@ -223,7 +222,7 @@ def test_a_checkpoint_and_another_stepper_go_on_far_from_0(start_taichi, quick, 
         sim = rts.Simulation(pool(UTM, body_force=None), rts.Regional(levels=3))
         sim.advance_to(0.1)
         rts.save_checkpoint(sim, tmp_path / "state.npz")
-        other = change_stepper(sim, rts.Uniform())
+        other = rts.change_stepper(sim, rts.Uniform())
         np.testing.assert_array_equal(other.positions(), sim.positions())
         other.advance_to(other.time + 0.01)
         assert np.abs(other.positions() - sim.positions()).max() < 0.1 * SPACING

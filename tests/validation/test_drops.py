@@ -81,7 +81,7 @@ def test_the_papers_setting_steps_regions_apart(oscillating):
 
 @pytest.mark.slow
 def test_order_of_convergence(simulate):
-    """Against the same particles at a 16 times smaller step (docs/evidence/asynchronous.md has the full tables)."""
+    """Against the same particles at a sixteenth of the smallest step tested (tables in docs/evidence/asynchronous.md)."""
     scene = rts.load_scene("oscillating_drop", spacing=0.125)
 
     def velocities(stepper):

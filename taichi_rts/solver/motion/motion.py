@@ -250,8 +250,14 @@ class Motion:
         v: ti.types.ndarray(),
         rho: ti.types.ndarray(),
         level: ti.types.ndarray(),
+        updated: ti.types.ndarray(),
+        a: ti.types.ndarray(),
     ):
-        """Write the state at `ahead` [s] after `now`, in order of particle id, into arrays outside Taichi."""
+        """Write the state at `ahead` [s] after `now`, by particle id, into arrays outside Taichi.
+
+        That is position, velocity and density; and of the last evaluation the level, 0 before it, the tick `updated` and the
+        acceleration.
+        """
         for i in range(self.particles.alive[None]):
             dt = self.elapsed(i, now, tick) + ahead
             position = self.position(i, dt, tick)
@@ -265,7 +271,9 @@ class Motion:
             for d in ti.static(range(self.particles.dim)):
                 x[identity, d] = position[d]
                 v[identity, d] = velocity[d]
+                a[identity, d] = self.particles.a[i][d]
             rho[identity] = self.particles.rho[i]
             if ti.static(self.particles.has_past):
                 rho[identity] = self.density(i, dt, tick)
-            level[identity] = ti.max(self.particles.level[i], 1)
+            level[identity] = self.particles.level[i]
+            updated[identity] = self.particles.updated[i]

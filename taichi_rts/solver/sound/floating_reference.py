@@ -1,6 +1,6 @@
 """An equation of state whose sound speed may change without the pressure jumping: its reference density floats."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -8,6 +8,23 @@ from taichi_rts.device.backend import ti
 from taichi_rts.medium.equation_of_state import Tait, tait
 from taichi_rts.solver.particles.particles import Particles
 from taichi_rts.solver.sound.rule import SoundRule
+
+
+class HostReference(NamedTuple):
+    """Sound speeds [m/s], stiffness B_i [Pa] and reference densities [kg/m^3], (N,), of particles at one moment, by id."""
+
+    sound: np.ndarray
+    stiffness: np.ndarray
+    reference: np.ndarray
+
+    def pressure_numpy(self, rho: Any) -> Any:
+        """Pressure [Pa], (N,), of the particles at densities `rho` [kg/m^3], (N,), by particle id."""
+        return np.maximum(self.stiffness * ((rho / self.reference) ** 7 - 1.0), 0.0)
+
+    def specific_energy(self, rho: Any) -> Any:
+        """Energy of compression [J/kg], (N,), as with Tait, from each particle's reference density."""
+        ratio = np.maximum(rho / self.reference, 1.0)
+        return self.stiffness / self.reference * (ratio**6 / 6.0 + 1.0 / ratio - 7.0 / 6.0)
 
 
 @ti.data_oriented
@@ -67,17 +84,16 @@ class FloatingReference(Tait):
 
     def pressure_numpy(self, rho: Any) -> Any:
         """Pressure [Pa], (N,), of the particles at densities `rho` [kg/m^3], (N,), by particle id."""
-        stiffness, reference = self._state()
-        return np.maximum(stiffness * ((rho / reference) ** 7 - 1.0), 0.0)
+        return self.on_host().pressure_numpy(rho)
 
     def specific_energy(self, rho: Any) -> Any:
         """Energy of compression [J/kg], (N,), as with Tait, from each particle's reference density."""
-        stiffness, reference = self._state()
-        ratio = np.maximum(rho / reference, 1.0)
-        return stiffness / reference * (ratio**6 / 6.0 + 1.0 / ratio - 7.0 / 6.0)
+        return self.on_host().specific_energy(rho)
 
-    def _state(self) -> tuple[np.ndarray, np.ndarray]:
+    def on_host(self) -> HostReference:
+        """Return the present sound speeds and reference densities, read from the device."""
         sound, reference = (
-            self.particles.to_numpy(field).astype(float) for field in (self.particles.sound, self.particles.reference)
+            self.particles.to_numpy(field) for field in (self.particles.sound, self.particles.reference)
         )
-        return self.rest_density / 7.0 * sound**2, reference
+        stiffness = self.rest_density / 7.0 * sound.astype(float) ** 2
+        return HostReference(sound, stiffness, reference.astype(float))

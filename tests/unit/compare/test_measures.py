@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -18,7 +20,13 @@ def drifting(speeds, shift=0.0, scale=1.0):
         v = np.zeros_like(x)
         v[:, 0] = speed * scale
         moved = x + np.array([0.01 * k + (shift if k else 0.0), 0.0])
-        run.append(k, moved, v, np.full(len(x), 1000.0), np.zeros(len(x)), (speed**2, 2.0 * speed, 0.0))
+        state = {
+            "positions": moved,
+            "velocities": v,
+            "densities": np.full(len(x), 1000.0),
+            "pressures": np.zeros(len(x)),
+        }
+        run.append(SimpleNamespace(time=k, energy=(speed**2, 2.0 * speed, 0.0), **state))
     return run
 
 

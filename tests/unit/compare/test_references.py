@@ -1,4 +1,5 @@
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -51,7 +52,13 @@ def test_the_sources_of_the_solver_count_and_others_do_not(tmp_path):
 
 def test_a_stored_reference_is_found_and_a_broken_one_is_not(tmp_path):
     run = Trajectory()
-    run.append(0.0, np.zeros((3, 2)), np.ones((3, 2)), np.ones(3), np.ones(3), (0.0, 1.0, 2.0))
+    state = {
+        "positions": np.zeros((3, 2)),
+        "velocities": np.ones((3, 2)),
+        "densities": np.ones(3),
+        "pressures": np.ones(3),
+    }
+    run.append(SimpleNamespace(time=0.0, energy=(0.0, 1.0, 2.0), **state))
     references.store(tmp_path, "key", run)
     assert references.load(tmp_path, "key").energies == [(0.0, 1.0, 2.0)]
     assert references.load(tmp_path, "other") is None

@@ -52,7 +52,7 @@ def test_keys_pause_step_reset_colour_and_clip(session, tmp_path):
     assert seen[0] == seen[9] == "level"
     assert len(set(seen)) == 9
     press(session, "p")
-    assert session.painter.options.palette == "paper"
+    assert session.options.palette == "paper"
     press(session, "x", "[", "[", "[", "[", "[")  # at 0.25: of five columns one is left
     left = session.view().positions
     assert len(left) == 15

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.assembly.handover import Snapshot, hand_over
+from taichi_rts.output.change_stepper import hand_over
 
 SCENE = rts.Scene(
     domain=rts.Box((0, 0), (1, 1)),
@@ -22,14 +22,14 @@ STEPPERS = [rts.Regional(levels=3), rts.Asynchronous()]
 def test_reset_gives_the_bits_of_a_new_run_and_a_change_goes_on(start_taichi, quick):
     with start_taichi("cpu", "f64", **quick):
         sims = [rts.Simulation(SCENE, stepper) for stepper in STEPPERS]
-        starts = [Snapshot.of(sim) for sim in sims]
+        starts = [sim.snapshot() for sim in sims]
         first = []
         for sim in sims:
             sim.advance_to(0.2)
             first.append([sim.ids(), *sim.state()])
         assert sims[0].removed_count > 0
         for sim, start, seen in zip(sims, starts, first, strict=True):
-            start.put_into(sim)
+            sim.continue_from(start)
             assert sim.time == 0.0
             assert sim.removed_count == 0
             sim.advance_to(0.2)
