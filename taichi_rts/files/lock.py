@@ -81,7 +81,7 @@ class FolderLock:
                         f"{self.folder} is being written to by process {holder.get('pid')} on {holder.get('host')}; "
                         f"choose another --output-dir, or, if that run is dead, delete {self.path}"
                     )
-                with contextlib.suppress(OSError):  # it may have been deleted by who had it, before this one was locked
+                with contextlib.suppress(OSError):  # its holder may have deleted it before this one was locked
                     if os.path.samestat(os.fstat(self.file), os.stat(self.path)):
                         break
                 self._close()
