@@ -1,4 +1,4 @@
-"""Checkpoints: all that decides the bits of what follows, in one file.
+"""Checkpoints: everything that decides the bits of the rest of a run, in one file.
 
 What is in it: every field and plain value of each simulation (`inventory.py`), the scene and the stepper as plain data,
 precision, versions. A simulation is built anew from its scene and its stepper, then its state is put back.
@@ -155,7 +155,7 @@ class Checkpoint:
         return sim
 
     def restore(self, sim: Simulation, run: int = 0) -> None:
-        """Put the state of number `run` into `sim`, which has the same scene and stepper; compiles next to nothing."""
+        """Put the state of number `run` into `sim`, which has the same scene and stepper; compiles almost nothing."""
         data, device = self.runs[run], backend.current()
         self._require_forces(run, sim.forces)
         if device.precision != self.precision:
