@@ -22,12 +22,12 @@ from taichi_rts.device import backend as backends
 from taichi_rts.device.backend import ti
 from taichi_rts.device.ownership import guarded
 from taichi_rts.errors import Error, Interrupted, SimulationDivergedError, TimeError
-from taichi_rts.medium.energy import Energy
 from taichi_rts.readings.diagnosis import diagnose
+from taichi_rts.readings.readers import Readers
 from taichi_rts.readings.reading import Moment, Reading
 from taichi_rts.rendering.painter import Painter, PictureOptions
 from taichi_rts.sampling.sampling import sample
-from taichi_rts.scene.placing import at_origin, origin_of, placed
+from taichi_rts.scene.placing import at_origin, origin_of
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.physics.own_forces import own_forces
 from taichi_rts.solver.stepping.base import Stepper
@@ -45,7 +45,7 @@ def _part(name: str) -> Any:
 
 
 @guarded("time", "count", "removed_count", "keeps_work", "keeps_momentum_budget")
-class Simulation:
+class Simulation(Readers):
     """A scene, a stepper, and the state in between.
 
     Call `taichi_rts.init` first, in the same thread; it may run in any. Another `init` ends it: what is then asked of it raises
@@ -231,10 +231,6 @@ class Simulation:
         """Number of fluid particles N."""
         return self.particles.count
 
-    def ids(self) -> np.ndarray:
-        """Stable ids, (N,), of the particles that all readers speak of, ascending; an outlet takes some out for good."""
-        return self.read().ids.copy()
-
     @property
     def removed_count(self) -> int:
         """Number of particles that outlets have taken out so far."""
@@ -277,63 +273,6 @@ class Simulation:
         self._tally = Tally(self.schedule.levels, base_steps=self.schedule.steps)
         self.start()
 
-    def placed(self, x: np.ndarray) -> np.ndarray:
-        """Positions `x` [m], (..., dim), counted from `origin`, as the scene counts: in double precision unless that is 0."""
-        return placed(self.scene, x)
-
-    def state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Positions [m] and velocities [m/s], (N, dim), densities [kg/m^3] and levels, (N,), at `time`, by particle id.
-
-        Reals have the run's precision, positions in a domain far from 0 double precision.
-        """
-        now = self.read()
-        return now.positions.copy(), now.velocities.copy(), now.densities.copy(), now.levels.copy()
-
-    def local_state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """As `state`, with positions [m], (N, dim), counted from `origin`: all reals have the run's precision."""
-        now = self.read()
-        return now.local_positions.copy(), now.velocities.copy(), now.densities.copy(), now.levels.copy()
-
-    def positions(self) -> np.ndarray:
-        """Positions [m], (N, dim), predicted to `time`, in order of particle id; far from 0 in double precision (`state`)."""
-        return self.read().positions.copy()
-
-    def velocities(self) -> np.ndarray:
-        """Velocities [m/s], (N, dim), predicted to `time`, in order of particle id."""
-        return self.read().velocities.copy()
-
-    def densities(self) -> np.ndarray:
-        """Densities [kg/m^3], (N,), by particle id: of each particle's last evaluation, with `Asynchronous` at `time`."""
-        return self.read().densities.copy()
-
-    def pressures(self) -> np.ndarray:
-        """Pressures [Pa], (N,), by particle id, that belong to `densities`."""
-        return self.read().pressures.copy()
-
-    def sound_speeds(self) -> np.ndarray:
-        """Sound speeds [m/s], (N,), at each particle's last evaluation, by particle id."""
-        return self.read().sound_speeds.copy()
-
-    def levels(self) -> np.ndarray:
-        """Levels n, (N,): each particle's step is n base steps. In order of particle id."""
-        return self.read().levels.copy()
-
-    def fluids(self) -> np.ndarray:
-        """Place of each particle's fluid in the scene, (N,), len(fluids) for what has flowed in. In order of particle id."""
-        return self.read().fluids.copy()
-
-    def steps(self) -> np.ndarray:
-        """Steps [s], (N,): level times base step (`Uniform(adaptive=True)`: at most). In order of particle id."""
-        return self.read().steps.copy()
-
-    def cell_times(self) -> np.ndarray:
-        """Time [s] of each particle's last force evaluation, (N,), by particle id: asynchronous cells run ahead of `time`."""
-        return self.read().cell_times.copy()
-
-    def leads(self) -> np.ndarray:
-        """How far [s] the end of each particle's step lies ahead of the earliest end, (N,). In order of particle id."""
-        return self.read().leads.copy()
-
     @property
     def statistics(self) -> dict[str, Any]:
         """Work so far: base_steps, particle_updates, wall_seconds, active_fraction, level_fractions and more.
@@ -352,14 +291,6 @@ class Simulation:
             "runaways": int(self.motion.runaways),
             **self.schedule.statistics(),
         }
-
-    def energy(self) -> Energy:
-        """Kinetic, potential and internal energy [J] at `time`."""
-        return self.read().energy
-
-    def momentum(self) -> np.ndarray:
-        """Total momentum [kg m/s], (dim,), at `time`."""
-        return self.read().momentum.copy()
 
     @property
     def keeps_work(self) -> bool:
