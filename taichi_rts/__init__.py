@@ -1,4 +1,7 @@
-"""Spatially varying time stepping for weakly compressible SPH, on Taichi. Importing starts nothing; call `init`."""
+"""Spatially varying time stepping for weakly compressible SPH, on Taichi. Importing starts nothing; call `init`.
+
+`ti` is the Taichi, or the fork of it, that is used: for own kernels.
+"""
 
 from taichi_rts.device.backend import init, ti  # first: it keeps Taichi from printing its banner
 
@@ -42,7 +45,9 @@ from taichi_rts.scene.parts.view import View
 from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
 from taichi_rts.solver.stepping.asynchronous import Asynchronous
+from taichi_rts.solver.stepping.base import Stepper
 from taichi_rts.solver.stepping.regional import Regional
+from taichi_rts.solver.stepping.steppers import register_stepper
 from taichi_rts.solver.stepping.uniform import Uniform
 
 __version__ = "0.1.0"
@@ -83,6 +88,7 @@ __all__ = [
     "Sphere",
     "SphereObstacle",
     "StandingWave",
+    "Stepper",
     "StepperError",
     "TaylorGreen",
     "TimeError",
@@ -93,6 +99,7 @@ __all__ = [
     "load_checkpoint",
     "load_scene",
     "read_particles",
+    "register_stepper",
     "save_checkpoint",
     "scene_names",
     "scene_schema",

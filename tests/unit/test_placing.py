@@ -287,7 +287,7 @@ def test_a_surface_far_from_0_is_the_one_at_0():
 
 
 def test_files_near_0_are_as_they_were(tmp_path):
-    """Single precision in PLY and no offset in bgeo: of a run at 0, and of particles that nobody says the spacing of."""
+    """Single precision in PLY and no offset in bgeo: of a run at 0, and of particles whose spacing is not known."""
     x = np.random.default_rng(0).random((100, 2))
     for spacing in (None, 0.05):
         with warnings.catch_warnings():
