@@ -21,7 +21,7 @@ from taichi_rts.solver.motion.inflow import Inflows
 from taichi_rts.solver.motion.motion import Motion
 from taichi_rts.solver.motion.outlet import Outlets
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.physics.continuity import ContinuityDensity, DensityDiffusion, MirroredPressure
 from taichi_rts.solver.physics.density import Density, SummationDensity
 from taichi_rts.solver.physics.momentum import Gravity, MomentumEquation, Pressure
@@ -77,7 +77,7 @@ def assemble(
 
 
 def optional_fields(scene: Scene, stepper: Stepper, debug: bool) -> frozenset[str]:
-    """Names of the fields of `Particles` and `Neighbourhood` that only some runs need."""
+    """Names of the fields of `FluidState` and `Neighbourhood` that only some runs need."""
     wanted = {
         "rho_rate": stepper.extrapolates_density,
         "past": stepper.keeps_past,
@@ -89,9 +89,9 @@ def optional_fields(scene: Scene, stepper: Stepper, debug: bool) -> frozenset[st
     return DENSITIES[scene.density].needs | {name for name, needed in wanted.items() if needed}
 
 
-def make_particles(scene: Scene, start: Sample, backend: Backend, needs: frozenset[str], unborn: int) -> Particles:
+def make_particles(scene: Scene, start: Sample, backend: Backend, needs: frozenset[str], unborn: int) -> FluidState:
     """Return the particles of the `start`, with room for `unborn` more."""
-    particles = Particles(
+    particles = FluidState(
         start.positions,
         start.velocities,
         start.densities,
@@ -111,7 +111,7 @@ def make_geometry(scene: Scene, stepper: Stepper) -> Geometry:
     return Geometry(scene.domain.lower, scene.domain.upper, scene.support, drift, scene.is_periodic)
 
 
-def make_medium(scene: Scene, start: Sample, particles: Particles, sound: SoundRule | None) -> Medium:
+def make_medium(scene: Scene, start: Sample, particles: FluidState, sound: SoundRule | None) -> Medium:
     """Return the fluid's constants, with the equation of state that belongs to its sound speed."""
     medium = Medium.of(scene, start.mass)
     if sound is None:
@@ -140,7 +140,7 @@ def make_windows(
 
 def make_momentum(
     scene: Scene,
-    particles: Particles,
+    particles: FluidState,
     near: Neighbourhood,
     grid: BlockGrid,
     windows: FluidWindows | None,

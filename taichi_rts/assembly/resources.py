@@ -80,7 +80,7 @@ def buffer_bytes(
     faces, turning = len(scene.moving_walls), sum(body.motion is not None for body in scene.obstacles)
     pose = 2 * dim + dim * dim + (1 if dim == 2 else 3)
     viscous = len(set(scene.viscosities)) > 1
-    # Reals and integers of `Particles`.
+    # Reals and integers of `FluidState`.
     reals, integers = 3 * dim + 1, 3 + 1 + bool(scene.inflows)
     reals += 1 if stepper.extrapolates_density or integrated else 0
     reals += 1 if integrated else 0

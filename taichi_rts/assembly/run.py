@@ -13,7 +13,7 @@ from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.motion.inflow import Inflows
 from taichi_rts.solver.motion.motion import Motion
 from taichi_rts.solver.motion.outlet import Outlets
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.sound.rule import SoundRule
 from taichi_rts.solver.stepping.base import Schedule, Stepper
 from taichi_rts.solver.stepping.timeline import Timeline
@@ -28,7 +28,7 @@ class Run(Protocol):
     backend: Backend
     medium: Medium
     timeline: Timeline
-    particles: Particles
+    particles: FluidState
     start_viscosities: np.ndarray
     grid: BlockGrid
     motion: Motion

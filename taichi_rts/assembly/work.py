@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from taichi_rts.device.backend import ti
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 
 
 @dataclass
@@ -84,7 +84,7 @@ class Overhead:
 
     EVERY = 61  # prime, or it would always sample the same pass of a cycle
 
-    def __init__(self, particles: Particles) -> None:
+    def __init__(self, particles: FluidState) -> None:
         self.particles = particles
         self.shared = Stopwatch()
         self.due = Stopwatch()

@@ -25,7 +25,7 @@ from taichi_rts.output.resume import (
     output_folder,
 )
 from taichi_rts.readings.extremes import Extremes
-from taichi_rts.rendering.painter import Mode, PictureOptions, View, make_cameras
+from taichi_rts.rendering.painter import Mode, PictureOptions, ViewName, make_cameras
 from taichi_rts.scene.checks.size import warn_of_size
 from taichi_rts.solver.stepping.steppers import STEPPERS, StepperName
 
@@ -111,7 +111,7 @@ class Run:
     """Splatter: draft has no shadows, best four times the samples of good (docs/rendering.md)."""
     transparent: bool = False
     """Splatter: frames with an alpha channel instead of a white background; shadows stay."""
-    views: tuple[View, ...] = ()
+    views: tuple[ViewName, ...] = ()
     """Views side by side in each frame: any of scene, front, side and top; by default the scene's alone."""
     panels: Literal["figure3", "ablation", "steppers"] | None = None
     """Several panels in a frame: the paper's Figure 3 or 2, or one for each stepper. They have their own steppers."""

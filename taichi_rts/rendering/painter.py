@@ -18,7 +18,7 @@ from taichi_rts.scene.placing import at_origin
 from taichi_rts.scene.scene import Scene
 
 Mode = Literal["level", "step", "lead", "speed", "density", "sound", "fluid", "pressure", "plain"]
-View = Literal["scene", "front", "side", "top"]
+ViewName = Literal["scene", "front", "side", "top"]
 VIEWS: dict[str, tuple[float, float]] = {"front": (0.0, 0.0), "side": (90.0, 0.0), "top": (0.0, 89.99)}
 """Azimuth and elevation [degrees] of the views without perspective; straight down, there would be no right."""
 MOST_VIEWS = 4
@@ -44,7 +44,7 @@ class PictureOptions:
     legend: bool = True
     quality: Literal["draft", "good", "best"] = "good"
     transparent: bool = False
-    views: tuple[View, ...] = ()
+    views: tuple[ViewName, ...] = ()
 
     def __post_init__(self) -> None:
         if self.renderer == "ggui" and (self.transparent or self.quality != "good"):
@@ -87,7 +87,7 @@ def make_cameras(scene: Scene, options: PictureOptions) -> list[Camera]:
     return [make_camera(scene, options, view) for view in options.views or ("scene",)]
 
 
-def make_camera(scene: Scene, options: PictureOptions, name: View = "scene") -> Camera:
+def make_camera(scene: Scene, options: PictureOptions, name: ViewName = "scene") -> Camera:
     """Return the camera of a view that frames the domain; "scene" is the scene's own, with the options' angles."""
     width, height = options.view_size
     if name in VIEWS:

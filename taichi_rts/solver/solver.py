@@ -12,7 +12,7 @@ from taichi_rts.solver.motion.inflow import Inflows
 from taichi_rts.solver.motion.motion import Motion
 from taichi_rts.solver.motion.outlet import Outlets
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.physics.density import Density
 from taichi_rts.solver.sound.rule import SoundRule
 from taichi_rts.solver.stepping.base import Schedule
@@ -30,7 +30,7 @@ class Solver:
         ticking: what is counted in ticks since each piece of its motion began.
     """
 
-    particles: Particles
+    particles: FluidState
     near: Neighbourhood
     grid: BlockGrid
     walls: list[Any]

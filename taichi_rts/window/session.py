@@ -43,8 +43,8 @@ class Settings:
     viscosity: float
 
 
-class View(NamedTuple):
-    """What is seen: positions [m], (M, dim), their colours, (M, 3), and the radius of all [m]."""
+class Spheres(NamedTuple):
+    """What is drawn: positions [m], (M, dim), their colours, (M, 3), and the radius of all [m]."""
 
     positions: np.ndarray
     colours: np.ndarray
@@ -337,7 +337,7 @@ class LiveSession:
 
     # -- what is seen -----------------------------------------------------------------------------------------------
 
-    def view(self) -> View:
+    def view(self) -> Spheres:
         """Return the fluid and the obstacles as they are now, cut open at the clip plane."""
         now, radius = self.sim.read(), 0.5 * self.scene.spacing * self.scale
         tints = self.tints.of(now, self.options.colour_by, self.options.palette)
@@ -347,7 +347,7 @@ class LiveSession:
             low, high = box.lower[self.clip_axis], box.upper[self.clip_axis]
             kept = x[:, self.clip_axis] <= low + self.clip_share * (high - low)
             x, tints = x[kept], tints[kept]
-        return View(x, tints, radius)
+        return Spheres(x, tints, radius)
 
     def entries(self) -> list[tuple[str, Any, float]]:
         """Return text, colour and share of each class of levels, as legends have them."""

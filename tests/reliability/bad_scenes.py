@@ -37,9 +37,8 @@ SCENES = [
     scene(
         "block outside the domain",
         with_parts(TANK, fluids=[block([0.0, 0.0], [1.5, 0.5])]),
-        "fluids.0",
-        "leaves the domain",
-        "move or shrink",
+        "fluids.0: block from (0.0, 0.0) to (1.5, 0.5) leaves the domain from (0.0, 0.0) to (1.0, 1.0)",
+        "move or shrink it, or enlarge the domain",
     ),
     scene(
         "blocks overlapping",
@@ -49,7 +48,9 @@ SCENES = [
     ),
     scene("block inside out", with_parts(TANK, fluids=[block([0.5, 0.5], [0.0, 0.0])]), "must exceed lower"),
     scene(
-        "spacing larger than a block", with_parts(TANK, spacing=0.6), "exceeds the shortest edge 0.5", "use at most 0.5"
+        "spacing larger than a block",
+        with_parts(TANK, spacing=0.6),
+        "spacing: 0.6 exceeds the shortest edge 0.5 of fluids.0; use at most 0.5",
     ),
     scene(
         "spacing of 1e-7: too many particles for 32 bits",
@@ -98,12 +99,14 @@ SCENES = [
     scene("one dimension", with_parts(TANK, domain=block([0.0], [1.0])), "domain.lower", "at least 2"),
     scene("four dimensions", with_parts(TANK, domain=block([0.0] * 4, [1.0] * 4)), "domain.lower", "at most 3"),
     scene(
-        "mixed dimensions", with_parts(TANK, fluids=[block([0.0] * 3, [0.5] * 3)]), "has 3 components; the domain has 2"
+        "mixed dimensions",
+        with_parts(TANK, fluids=[block([0.0] * 3, [0.5] * 3)]),
+        "fluids.0: has 3 components; the domain has 2",
     ),
     scene(
         "gravity of another dimension",
         with_parts(TANK, gravity=[0.0, 0.0, -9.81]),
-        "has 3 components; the domain has 2",
+        "gravity (0.0, 0.0, -9.81) has 3 components; the domain has 2",
     ),
     scene("unknown key", with_parts(TANK, spacin=1.0), "spacin: unknown key", "did you mean 'spacing'"),
     scene("a number with a unit", with_parts(TANK, spacing="0.1 m"), "spacing", "plain number", "0.1 m"),
@@ -124,7 +127,7 @@ SCENES = [
     scene(
         "nothing moves, no sound speed",
         with_parts(TANK, gravity=[0.0, 0.0]),
-        "nothing falls or moves",
+        "sound_speed: nothing falls or moves",
         "give it a value",
     ),
     scene(
@@ -187,20 +190,24 @@ SCENES = [
     scene(
         "obstacle outside the domain",
         with_parts(TANK, obstacles=[{"shape": "sphere", "centre": [5.0, 5.0], "radius": 0.2}]),
-        "outside the domain",
+        "sphere from (4.8, 4.8) to (5.2, 5.2) lies outside the domain from (0, 0) to (1, 1)",
         "move it",
     ),
     scene(
         "obstacle thinner than the spacing",
         with_parts(TANK, obstacles=[{"shape": "box", "lower": [0.6, 0.0], "upper": [0.61, 0.5]}]),
-        "thin",
-        "use a spacing of at most",
+        "is 0.01 m thin, the spacing 0.1; use a spacing of at most 0.01",
     ),
-    scene("obstacle of an unknown shape", with_parts(TANK, obstacles=[{"shape": "cone"}]), "shape", "choose one of"),
+    scene(
+        "obstacle of an unknown shape",
+        with_parts(TANK, obstacles=[{"shape": "cone"}]),
+        "shape is missing or unknown",
+        "one of box, sphere",
+    ),
     scene(
         "fluid inside an obstacle",
         with_parts(TANK, obstacles=[{"shape": "box", "lower": [0.0, 0.0], "upper": [0.6, 0.6]}]),
-        "lies wholly inside obstacles.0",
+        "fluids.0: lies wholly inside obstacles.0; move or shrink one",
     ),
     scene("mesh open", mesh("open.obj"), "is open", "close its holes"),
     scene("mesh missing", mesh("none.obj"), "does not exist", "check the path"),

@@ -7,7 +7,7 @@ import numpy as np
 from taichi_rts.device.backend import ti
 from taichi_rts.sampling.sampling import fill_patch
 from taichi_rts.scene.scene import Scene
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.physics.timetable import LAST
 
 
@@ -61,7 +61,7 @@ class Inflows:
         """Whether a layer has crossed its patch by `time` [s] and is not among the particles yet."""
         return any(patch.entered(time) > done for patch, done in zip(self.patches, self.done, strict=True))
 
-    def enter(self, particles: Particles, now: int, tick: float) -> None:
+    def enter(self, particles: FluidState, now: int, tick: float) -> None:
         """Append the layers that have crossed by tick `now`."""
         time = now * tick
         for number, patch in enumerate(self.patches):

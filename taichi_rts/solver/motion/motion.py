@@ -8,7 +8,7 @@ from taichi_rts.device.counters import Counters
 from taichi_rts.medium.medium import Medium
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.physics.momentum import MomentumEquation
 from taichi_rts.solver.physics.moving_walls import MovingFace
 
@@ -29,7 +29,7 @@ class Motion:
 
     def __init__(
         self,
-        particles: Particles,
+        particles: FluidState,
         near: Neighbourhood,
         grid: BlockGrid,
         momentum: MomentumEquation,

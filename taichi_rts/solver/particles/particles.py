@@ -1,4 +1,4 @@
-"""The state of the fluid: what persists (`Particles`) and what neighbours read in one step (`Neighbourhood`).
+"""The state of the fluid: what persists (`FluidState`) and what neighbours read in one step (`Neighbourhood`).
 
 A particle's state is anchored at its own last force evaluation: position, velocity and acceleration at the tick
 `updated`. Between evaluations it moves with that constant acceleration, which composes exactly: its state at any later
@@ -15,7 +15,7 @@ from taichi_rts.solver.particles.fields import Rows, Values, batches, components
 
 
 @ti.data_oriented
-class Particles:
+class FluidState:
     """Struct-of-arrays fields, (capacity,) each; positions x [m], velocities v [m/s], accelerations a [m/s^2], density rho.
 
     The first `alive[None]` entries hold particles; only an inflow leaves room for more. `born` ids have been given so far,

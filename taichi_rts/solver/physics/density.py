@@ -9,14 +9,14 @@ from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.grid.neighbour_sum import NeighbourSum
 from taichi_rts.solver.grid.windows import FluidWindows
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 
 
 @ti.data_oriented
 class Density:
     """A formulation of density: one sum over neighbours (`pairs`), from which `update` finds what the due particles have.
 
-    `needs` names the optional fields it works with (see `Particles`); `integrates` says whether density is carried in time.
+    `needs` names the optional fields it works with (see `FluidState`); `integrates` says whether density is carried in time.
     """
 
     integrates = False
@@ -26,7 +26,7 @@ class Density:
 
     def __init__(
         self,
-        particles: Particles,
+        particles: FluidState,
         near: Neighbourhood,
         grid: BlockGrid,
         windows: FluidWindows | None,

@@ -6,7 +6,7 @@ import numpy as np
 
 from taichi_rts.device.backend import ti
 from taichi_rts.medium.equation_of_state import Tait, tait
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.sound.rule import SoundRule
 
 
@@ -42,7 +42,7 @@ class FloatingReference(Tait):
     is above the ceiling, down by 1/c_new = 1/c + dt/(memory r).
     """
 
-    def __init__(self, tait: Tait, particles: Particles, rule: SoundRule) -> None:
+    def __init__(self, tait: Tait, particles: FluidState, rule: SoundRule) -> None:
         vars(self).update(vars(tait))
         self.particles = particles
         self.rule = rule

@@ -7,7 +7,7 @@ from taichi_rts.medium.equation_of_state import tait
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.grid.surroundings import Surroundings
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.limits import BlockMaxima
 
@@ -39,7 +39,7 @@ class SoundRule:
     [m^2/s^4] and the largest viscosity [m^2/s] of each block.
     """
 
-    def __init__(self, scene: Scene, particles: Particles, grid: BlockGrid) -> None:
+    def __init__(self, scene: Scene, particles: FluidState, grid: BlockGrid) -> None:
         description = scene.regional_sound
         assert description is not None
         self.particles = particles

@@ -3,7 +3,7 @@
 from taichi_rts.device.backend import ti
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.limiter import EMPTY
 from taichi_rts.solver.stepping.regions import RegionalSchedule
@@ -27,7 +27,7 @@ class AlignedBlocks(RegionalSchedule):
     aligned = True
     levels_double = True
 
-    def __init__(self, settled: SettledRegions, scene: Scene, particles: Particles, grid: BlockGrid) -> None:
+    def __init__(self, settled: SettledRegions, scene: Scene, particles: FluidState, grid: BlockGrid) -> None:
         super().__init__(settled, scene, particles, grid)
         grid.track_arrivals()
         self.until_next, self.ends = (ti.field(ti.i32, ()) for _ in range(2))

@@ -21,7 +21,7 @@ from taichi_rts.scene.scene import Scene
 from taichi_rts.scene.validation import FROZEN, Positive, validated
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.integrators.serna import Serna
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.base import ONE_STEP_COURANT, Courant, Schedule, Setup, Stepper
 from taichi_rts.solver.stepping.passes import AsynchronousSchedule
@@ -147,6 +147,6 @@ class Asynchronous(Stepper):
             seed=self.stagger or 0,
         )
 
-    def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
+    def schedule(self, scene: Scene, particles: FluidState, grid: BlockGrid, timeline: Timeline) -> Schedule:
         """Build the fields and kernels that find the cells that may step."""
         return AsynchronousSchedule(self.in_scene(scene), scene, particles, grid, timeline)

@@ -12,7 +12,7 @@ from taichi_rts.device.backend import ti
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.integrators.serna import Serna
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.stepping.timeline import Timeline
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ class Stepper:
         """Return the clock for `scene`: its tick divides the base step."""
         raise NotImplementedError
 
-    def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
+    def schedule(self, scene: Scene, particles: FluidState, grid: BlockGrid, timeline: Timeline) -> Schedule:
         """Build the fields and kernels that decide which particles are due."""
         raise NotImplementedError
 
@@ -151,7 +151,7 @@ class Schedule:
     sound: Any = None
     transient = frozenset({"due", "flag"})
 
-    def __init__(self, particles: Particles, grid: BlockGrid) -> None:
+    def __init__(self, particles: FluidState, grid: BlockGrid) -> None:
         self.particles = particles
         self.grid = grid
         self.due = grid.rank  # which only a sort needs, and after a sort the list is made anew

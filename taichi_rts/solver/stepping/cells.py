@@ -7,7 +7,7 @@ from taichi_rts.device.backend import ti
 from taichi_rts.device.counters import Counters
 from taichi_rts.device.scan import ExclusiveScan
 from taichi_rts.solver.grid.grid import BlockGrid
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.stepping.base import Schedule
 from taichi_rts.solver.stepping.limiter import EMPTY
 
@@ -21,7 +21,7 @@ class Cells(Schedule):
 
     EMPTY = EMPTY
 
-    def __init__(self, particles: Particles, grid: BlockGrid, levels: int) -> None:
+    def __init__(self, particles: FluidState, grid: BlockGrid, levels: int) -> None:
         super().__init__(particles, grid)
         self.levels = levels
         blocks = grid.geometry.blocks

@@ -8,7 +8,7 @@ from taichi_rts.scene.parts.conditions import face_axis, face_position
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.geometry import MARGIN
 from taichi_rts.solver.grid.grid import BlockGrid
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.physics.path import Path
 
 
@@ -16,7 +16,7 @@ from taichi_rts.solver.physics.path import Path
 class BlockMaxima:
     """Reduces a block's particles to what the criteria ask for (Algorithm 1, lines 6-7)."""
 
-    def __init__(self, scene: Scene, particles: Particles, grid: BlockGrid) -> None:
+    def __init__(self, scene: Scene, particles: FluidState, grid: BlockGrid) -> None:
         self.particles = particles
         self.grid = grid
         self.geometry = grid.geometry

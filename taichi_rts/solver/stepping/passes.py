@@ -10,7 +10,7 @@ from taichi_rts.device.backend import ti
 from taichi_rts.device.counters import Counters
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.cells import Cells
 from taichi_rts.solver.stepping.limiter import NeighbourLimiter
@@ -36,7 +36,7 @@ class AsynchronousSchedule(Cells):
     transient = frozenset({"reads_are_slow"})  # of the device
 
     def __init__(
-        self, settled: SettledCells, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline
+        self, settled: SettledCells, scene: Scene, particles: FluidState, grid: BlockGrid, timeline: Timeline
     ) -> None:
         super().__init__(particles, grid, settled.levels)
         self.scene = scene

@@ -12,7 +12,7 @@ from taichi_rts.scene.scene import Scene
 from taichi_rts.scene.validation import FROZEN, Positive, validated
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.integrators.serna import Serna
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.aligned import AlignedBlocks
 from taichi_rts.solver.stepping.base import ONE_STEP_COURANT, Courant, Schedule, Setup, Stepper
@@ -211,7 +211,7 @@ class Regional(Stepper):
         divisor = settled.levels if settled.strict_cfl else 1
         return Timeline(min(step / divisor, criteria.scene_viscous_step(scene)))
 
-    def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
+    def schedule(self, scene: Scene, particles: FluidState, grid: BlockGrid, timeline: Timeline) -> Schedule:
         """Build the schedule of Algorithm 1: by particle as in the paper, of aligned blocks, or by sound speed."""
         settled = self.in_scene(scene)
         if scene.regional_sound is not None:

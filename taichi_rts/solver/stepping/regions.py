@@ -12,7 +12,7 @@ from taichi_rts.device.scan import ExclusiveScan
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.grid.surroundings import Surroundings
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.base import Schedule
 from taichi_rts.solver.stepping.limiter import EMPTY, GrowingSweep, Ladder, NeighbourLimiter, Sweep
@@ -36,7 +36,7 @@ class RegionalSchedule(Schedule):
     reach_of_regions = 1
     """How much longer than a neighbour's a block's step may be at once: 1 is the paper's R_min."""
 
-    def __init__(self, settled: SettledRegions, scene: Scene, particles: Particles, grid: BlockGrid) -> None:
+    def __init__(self, settled: SettledRegions, scene: Scene, particles: FluidState, grid: BlockGrid) -> None:
         super().__init__(particles, grid)
         self.scene = scene
         self.levels = settled.levels

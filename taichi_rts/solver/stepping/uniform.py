@@ -12,7 +12,7 @@ from taichi_rts.scene.validation import FROZEN, Positive, validated
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.integrators.serna import Serna
 from taichi_rts.solver.integrators.symplectic_euler import SymplecticEuler
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.base import ONE_STEP_COURANT, Courant, Schedule, Setup, Stepper
 from taichi_rts.solver.stepping.timeline import Timeline
@@ -74,7 +74,7 @@ class Uniform(Stepper):
         )
         return Timeline(step / SUBDIVISIONS if self.adaptive else step)
 
-    def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
+    def schedule(self, scene: Scene, particles: FluidState, grid: BlockGrid, timeline: Timeline) -> Schedule:
         """Build the schedule under which all particles are always due."""
         if self.adaptive:
             return AdaptiveSchedule(self, scene, particles, grid, timeline)
@@ -85,7 +85,7 @@ class Uniform(Stepper):
 class UniformSchedule(Schedule):
     """All particles, every step."""
 
-    def __init__(self, particles: Particles, grid: BlockGrid) -> None:
+    def __init__(self, particles: FluidState, grid: BlockGrid) -> None:
         super().__init__(particles, grid)
         self.due = ti.field(ti.i32, particles.capacity)
         particles.level.fill(1)
@@ -109,7 +109,7 @@ class AdaptiveSchedule(UniformSchedule):
     """All particles, every step; the step follows the largest speed and acceleration. Costs one small read a step."""
 
     def __init__(
-        self, stepper: Uniform, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline
+        self, stepper: Uniform, scene: Scene, particles: FluidState, grid: BlockGrid, timeline: Timeline
     ) -> None:
         super().__init__(particles, grid)
         self.scene = scene

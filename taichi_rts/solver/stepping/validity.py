@@ -3,7 +3,7 @@
 from taichi_rts.device.backend import ti
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.stepping.regions import RegionalSchedule
 from taichi_rts.solver.stepping.settled import SettledRegions
 
@@ -15,7 +15,7 @@ class ValidityByParticle(RegionalSchedule):
     validity = level - (now - updated), so that no particle has to count it down (lines 14-16).
     """
 
-    def __init__(self, settled: SettledRegions, scene: Scene, particles: Particles, grid: BlockGrid) -> None:
+    def __init__(self, settled: SettledRegions, scene: Scene, particles: FluidState, grid: BlockGrid) -> None:
         super().__init__(settled, scene, particles, grid)
         self.flag = ti.field(ti.i32, particles.capacity)
         """The compute flag of the particle at a place."""

@@ -1,7 +1,6 @@
 """Obstacles before a run: descriptions, faults, geometry, wall particles, fluid left out."""
 
 import os
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -44,8 +43,6 @@ MOVE = rts.ConstantMotion(velocity=(1, 0))
     ("obstacle", "parts"),
     [
         (rts.SphereObstacle((0.5, 0.5, 0.5), 0.1), ["obstacles.0: sphere has 3 dimensions; the domain has 2"]),
-        (rts.SphereObstacle((2, 2), 0.1), ["sphere from (1.9, 1.9) to (2.1, 2.1) lies outside the domain", "move it"]),
-        (rts.SphereObstacle((0.5, 0.5), 0.01), ["is 0.02 m thin, the spacing 0.04; use a spacing of at most 0.02"]),
         (
             rts.BoxObstacle((0.4, 0.4), (0.6, 0.6), rotation=(0, 0, 1)),
             ["rotation (0.0, 0.0, 1.0) has 3 components", "give 1"],
@@ -58,7 +55,6 @@ MOVE = rts.ConstantMotion(velocity=(1, 0))
             rts.SphereObstacle((0.5, 0.5), 0.1, motion=rts.Keyframes((0, 1), rotations=((0, 0, 0), (0, 0, 9)))),
             ["motion.rotations (0.0, 0.0, 0.0) has 3 components; in 2 dimensions give 1"],
         ),
-        (rts.BoxObstacle((-0.1, -0.1), (1.1, 1.1)), ["fluids.0: lies wholly inside obstacles.0; move or shrink one"]),
     ],
 )
 def test_an_obstacle_that_does_not_fit_the_scene_is_refused(obstacle, parts):
@@ -87,7 +83,6 @@ def test_an_obstacle_across_a_periodic_face_is_refused():
         (lambda: rts.BoxObstacle((0, 0), (0, 1)), "upper .* must exceed lower"),
         (lambda: rts.CylinderObstacle((0, 0, 0), (0, 0, 0), 1), "give the axis a length"),
         (lambda: rts.PolygonObstacle(((0, 0), (1, 0), (2, 0))), "enclose no area"),
-        (lambda: scene(obstacles=[{"shape": "cone"}]), "shape is missing or unknown; choose one of box, sphere"),
         (lambda: scene(obstacles=[{"shape": "box", "lower": [0, 0], "uper": [1, 1]}]), "uper: unknown key"),
     ],
 )
@@ -122,17 +117,6 @@ def test_a_mesh_that_cannot_be_used_is_refused(tmp_path, change, parts):
     assert all(part in message for part in ["obstacles.0: ", *parts]), message
 
 
-def test_a_mesh_that_is_not_there_is_refused(tmp_path, monkeypatch):
-    missing = str(tmp_path / "none.obj")
-    assert f"mesh file {missing!r} does not exist; check the path" in complaint(
-        3, obstacles=[rts.MeshObstacle(missing)]
-    )
-    assert "is no OBJ, STL or PLY file" in complaint(3, obstacles=[rts.MeshObstacle(str(tmp_path / "a.blend"))])
-    monkeypatch.setitem(sys.modules, "trimesh", None)
-    message = complaint(3, obstacles=[rts.MeshObstacle(BALL, scale=1.23)])
-    assert "cannot be read without trimesh; install it: pip install 'taichi_rts[mesh]'" in message
-
-
 def test_a_mesh_is_read_once_for_each_description(tmp_path):
     pytest.importorskip("trimesh")
     file = write_wedge(tmp_path / "moving.obj", lambda lines: lines)
@@ -149,19 +133,13 @@ def test_a_mesh_is_read_once_for_each_description(tmp_path):
     assert made.wall_speed == pytest.approx(2 * reach, rel=1e-12)
 
 
-def test_scene_files_hold_obstacles(tmp_path):
+def test_scene_files_hold_obstacles():
     pytest.importorskip("trimesh")
     loaded = rts.load_scene(MESHES / "dam_break_meshes.toml")
     assert [obstacle.shape for obstacle in loaded.obstacles] == ["mesh", "mesh", "box"]
     assert loaded.obstacles[0].file == BALL
     assert loaded.obstacles[2].motion == rts.ConstantMotion(angular_velocity=(0, 0, 3))
     assert scene_from(loaded.to_dict()) == loaded
-    path = tmp_path / "escape.toml"
-    path.write_text((MESHES / "dam_break_meshes.toml").read_text().replace("ball.obj", "../ball.obj"))
-    with pytest.raises(
-        rts.SceneError, match=r"obstacles.0.file: '../ball.obj' leaves the scene's folder .*; put it there"
-    ):
-        rts.load_scene(path)
 
 
 def test_a_body_follows_its_keyframes():
@@ -207,7 +185,7 @@ def test_geometry_and_wall_particles(name):
     x = np.random.default_rng(0).uniform(solid.lower - S, solid.upper + S, (20_000, dim))
     box = np.prod(solid.upper - solid.lower + 2 * S)
     assert (solid.distance(x) < 0).mean() * box == pytest.approx(volume, rel=0.05)
-    assert grid.at(solid.surface(0.1 * S)).max() < 0.02 * S  # nobody who is outside by the grid is inside
+    assert grid.at(solid.surface(0.1 * S)).max() < 0.02 * S  # a point outside by the grid is outside
     assert np.abs(grid.at(x) - solid.distance(x)).max() < 0.5 * S
     depth, _ = calibrate_walls(scene(dim))
     walls, normals = line_solid(solid, depth, S)

@@ -7,7 +7,7 @@ from taichi_rts.device.backend import ti
 from taichi_rts.solver.grid.geometry import Geometry
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.grid.surroundings import Surroundings
-from taichi_rts.solver.particles.particles import Particles
+from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.stepping.limiter import EMPTY, Ladder, NeighbourLimiter, Sweep
 from taichi_rts.solver.stepping.settled import lengths
 
@@ -77,7 +77,7 @@ SCENE = rts.Scene(domain=rts.Box((0, 0), (2, 1)), fluids=[rts.Block((0, 0), (0.4
 def levels_from(stepper, raw_levels, ticks=1):
     """What blocks allow themselves, which are occupied, and the levels that `stepper` gives them at each of `ticks` steps."""
     geometry = Geometry((0, 0), (2, 1), SCENE.support)
-    state = Particles(np.zeros((1, 2)), np.zeros((1, 2)), np.ones(1), 1.0, backend.current())
+    state = FluidState(np.zeros((1, 2)), np.zeros((1, 2)), np.ones(1), 1.0, backend.current())
     schedule = stepper.schedule(SCENE, state, BlockGrid(geometry, 1), stepper.timeline(SCENE))
     raw = random_levels(geometry, n_max=1)
     occupied = raw != EMPTY
