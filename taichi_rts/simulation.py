@@ -29,6 +29,7 @@ from taichi_rts.rendering.painter import Painter, PictureOptions
 from taichi_rts.sampling.sampling import sample
 from taichi_rts.scene.placing import at_origin, origin_of, placed
 from taichi_rts.scene.scene import Scene
+from taichi_rts.solver.physics.own_forces import own_forces
 from taichi_rts.solver.stepping.base import Stepper
 from taichi_rts.solver.stepping.regional import Regional
 
@@ -36,7 +37,11 @@ OnFrame = Callable[["Simulation"], object]
 
 
 def _part(name: str) -> Any:
-    return property(lambda sim: getattr(sim.solver, name))
+    def part(sim: Any) -> Any:
+        return getattr(sim.solver, name)
+
+    part.__doc__ = f"The `{name}` of the run's solver."
+    return property(part)
 
 
 @guarded("time", "count", "removed_count", "keeps_work", "keeps_momentum_budget")
@@ -46,10 +51,11 @@ class Simulation:
     Call `taichi_rts.init` first, in the same thread; it may run in any. Another `init` ends it: what is then asked of it raises
     `BackendError`. Building one compiles its kernels and evaluates the first forces. With `debug` the stepper
     checks at every step what is true by construction, and raises `AssertionError` where it is not; and the walls' impulse is
-    added up.
+    added up. `forces` are a user's own: body forces and pair forces (docs/extending.md); `energy` knows no potential of theirs.
 
     Attributes:
         scene: what is simulated, with "auto" decided.
+        forces: a user's own.
         local: the same with its coordinates counted from `origin`, as the device has them.
     """
 
@@ -57,16 +63,24 @@ class Simulation:
     _latest: weakref.ref[Reading] | None = None
 
     def __init__(
-        self, scene: Scene, stepper: Stepper | None = None, *, debug: bool = False, started: bool = True
+        self,
+        scene: Scene,
+        stepper: Stepper | None = None,
+        *,
+        forces: Sequence[Any] = (),
+        debug: bool = False,
+        started: bool = True,
     ) -> None:
         self.backend = backends.current()
         self.taichi_start = backends.start_for_fields()
         self.stepper = stepper if stepper is not None else cast(Stepper, Regional())
+        own = own_forces(forces, origin_of(scene))
+        self.forces = tuple(forces)
         self.scene = scene.with_sound_for(self.stepper)
         require(self.scene, [self.stepper], self.backend, debug=debug)
         self.local = at_origin(self.scene)
         sampled = sample(self.local)
-        self.solver = assemble(self.local, self.stepper, sampled, self.backend, debug=debug)
+        self.solver = assemble(self.local, self.stepper, sampled, self.backend, own, debug=debug)
         self._fluids, self._obstacle_layers, self.start_viscosities = (
             sampled.fluids,
             sampled.obstacles,
@@ -324,7 +338,7 @@ class Simulation:
     def statistics(self) -> dict[str, Any]:
         """Work so far: base_steps, particle_updates, wall_seconds, active_fraction, level_fractions and more.
 
-        `overhead_fraction` is the share of a step in which all are due that everybody pays (grid, regions, prediction),
+        `overhead_fraction` is the share of a full step that is spent for all particles (grid, regions, prediction),
         measured on a sample of the steps. `stopped_by_domain` and `stopped_by_obstacles` count centres that a face of the
         domain or an obstacle had to stop, `removed_by_outlets` particles that each outlet has taken out, `runaways` speeds
         and accelerations that had to be limited because the run has blown up.

@@ -47,7 +47,11 @@ def keeps_momentum_budget(run: Run) -> bool:
     """Whether `momentum_drift` can say anything."""
     scene = run.scene
     return run.particles.has_budget and not (
-        scene.body_force or scene.gravity_changes or scene.inflows or scene.outlets
+        scene.body_force
+        or scene.gravity_changes
+        or scene.inflows
+        or scene.outlets
+        or run.motion.momentum.own_bodies.bodies
     )
 
 
@@ -55,7 +59,7 @@ def momentum_drift(run: Run, gained: np.ndarray) -> np.ndarray:
     """Momentum [kg m/s], (dim,), that no outer force accounts for: what was `gained` less gravity's and the walls' share.
 
     Zero to rounding with uniform steps, where partners push each other equally at the same time. Needs a debug run and a
-    scene without body force, changes of gravity, inflows and outlets, else raises `Error`.
+    scene without body forces, changes of gravity, inflows and outlets, else raises `Error`.
     """
     if not keeps_momentum_budget(run):
         raise Error(

@@ -25,6 +25,7 @@ from taichi_rts.solver.particles.particles import Particles
 from taichi_rts.solver.physics.continuity import ContinuityDensity, DensityDiffusion, MirroredPressure
 from taichi_rts.solver.physics.density import Density, SummationDensity
 from taichi_rts.solver.physics.momentum import Gravity, MomentumEquation, Pressure
+from taichi_rts.solver.physics.own_forces import OwnForces
 from taichi_rts.solver.physics.timetable import Ticking
 from taichi_rts.solver.physics.viscosity import viscosity_terms
 from taichi_rts.solver.solver import Solver
@@ -35,8 +36,13 @@ from taichi_rts.solver.stepping.base import Stepper
 DENSITIES: dict[str, type[Density]] = {"summation": SummationDensity, "continuity": ContinuityDensity}
 
 
-def assemble(scene: Scene, stepper: Stepper, start: Sample, backend: Backend, *, debug: bool = False) -> Solver:
-    """Build the parts of a run of `scene`, whose coordinates are counted from its origin, from its particles at the `start`."""
+def assemble(
+    scene: Scene, stepper: Stepper, start: Sample, backend: Backend, own: OwnForces, *, debug: bool = False
+) -> Solver:
+    """Build the parts of a run of `scene`, whose coordinates are counted from its origin, from its particles at the `start`.
+
+    `own` are the forces of a user's own.
+    """
     timeline = stepper.timeline(scene)
     needs = optional_fields(scene, stepper, debug)
     inflows = Inflows(scene, start.mass) if scene.inflows else None
@@ -55,7 +61,7 @@ def assemble(scene: Scene, stepper: Stepper, start: Sample, backend: Backend, *,
         particles,
         near,
         grid,
-        make_momentum(scene, particles, near, grid, windows, walls, medium, backend),
+        make_momentum(scene, particles, near, grid, windows, walls, medium, backend, own),
         stepper.make_integrator(),
         medium,
         integrates_density=density.integrates,
@@ -141,8 +147,9 @@ def make_momentum(
     walls: list[Any],
     medium: Medium,
     backend: Backend,
+    own: OwnForces,
 ) -> MomentumEquation:
-    """Return the momentum equation with the terms that the scene has."""
+    """Return the momentum equation with the terms that the scene has, and forces of a user's own."""
     integrates = DENSITIES[scene.density].integrates
     gravity = Gravity(scene)
     return MomentumEquation(
@@ -157,4 +164,5 @@ def make_momentum(
         backend,
         with_rho_rate=particles.has_rho_rate,
         diffusion=DensityDiffusion(medium, scene) if integrates else None,
+        own=own,
     )

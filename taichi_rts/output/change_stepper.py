@@ -15,7 +15,7 @@ def change_stepper(sim: Simulation, stepper: Stepper, **changes: Any) -> Simulat
     `changes` replace fields of its scene that fluid and walls do not depend on, such as `kinematic_viscosity`. The time is
     moved on to the next tick of the new stepper's clock. Raises `StepperError` or `SceneError`.
     """
-    other = Simulation(sim.scene.replace(**changes), stepper, debug=sim.schedule.debug)
+    other = Simulation(sim.scene.replace(**changes), stepper, forces=sim.forces, debug=sim.schedule.debug)
     hand_over(sim, other)
     return other
 

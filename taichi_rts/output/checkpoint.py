@@ -1,4 +1,4 @@
-"""Checkpoints: all that decides the bits of what follows, in one file.
+"""Checkpoints: everything that decides the bits of the rest of a run, in one file.
 
 What is in it: every field and plain value of each simulation (`inventory.py`), the scene and the stepper as plain data,
 precision, versions. A simulation is built anew from its scene and its stepper, then its state is put back.
@@ -18,13 +18,14 @@ import numpy as np
 from taichi_rts.assembly.inventory import State
 from taichi_rts.device import backend, forks
 from taichi_rts.device.backend import ti
-from taichi_rts.errors import CheckpointError, Error
+from taichi_rts.errors import CheckpointError, Error, StepperError
 from taichi_rts.files.archive import Archive, open_archive, write_archive
 from taichi_rts.scene.files.reading import moved_along, parts_with_files, places_beside, require_files_near
 from taichi_rts.scene.loading import scene_from
-from taichi_rts.scene.parts.obstacles import changed_mesh, file_digest
+from taichi_rts.scene.obstacles.mesh import changed_mesh, file_digest
 from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
+from taichi_rts.solver.physics.own_forces import forces_data
 from taichi_rts.solver.stepping.steppers import stepper_data, stepper_from
 
 FORMAT = 3
@@ -41,19 +42,24 @@ def save_checkpoint(sim: Simulation, path: str | Path) -> None:
     write(Path(path), [sim])
 
 
-def load_checkpoint(path: str | Path, run: int = 0) -> Simulation:
+def load_checkpoint(
+    path: str | Path, run: int = 0, *, forces: Sequence[Any] = (), steppers: Sequence[type] = ()
+) -> Simulation:
     """Build the simulation that `save_checkpoint` or a run with `--checkpoint-every` wrote.
 
     Call `taichi_rts.init` first, with the precision that it had. `run` chooses one of several, where panels showed several.
-    Raises `CheckpointError` for a file that is not whole, is of another version, or has another precision.
+    The file holds no code: give forces of your own again as you gave them to `Simulation`, and the class of a stepper of your own
+    in `steppers`, unless it is registered (`register_stepper`).
+    Raises `CheckpointError` for a file that is not whole, is of another version, has another precision, another stepper or other
+    forces.
     """
     with open_archive(Path(path)) as archive:
-        checkpoint = Checkpoint(archive)
+        checkpoint = Checkpoint(archive, steppers)
         if not 0 <= run < len(checkpoint.runs):
             raise CheckpointError(
                 f"{path} has no run {run}, only {len(checkpoint.runs)} of them; use 0 to {len(checkpoint.runs) - 1}"
             )
-        return checkpoint.simulation(run)
+        return checkpoint.simulation(run, forces=forces)
 
 
 def write(
@@ -71,6 +77,7 @@ def write(
         arrays |= {f"{number}/{name}": field.to_numpy() for name, field in state.fields.items()}
         scene, stepper = sim.scene.to_dict(), stepper_data(sim.stepper)
         runs.append({"scene": scene, "stepper": stepper, "debug": sim.schedule.debug, "time": sim.time})
+        runs[-1] |= {"forces": forces_data(sim.forces)} if sim.forces else {}
         runs[-1] |= {"fields": list(state.fields), "values": values}
     device = sims[0].backend
     files: dict[str, str] = {}
@@ -90,9 +97,12 @@ def write(
 
 
 class Checkpoint:
-    """What is in an open archive. Raises `CheckpointError` unless this version can read it."""
+    """What is in an open archive. Raises `CheckpointError` unless this version can read it.
 
-    def __init__(self, archive: Archive) -> None:
+    `steppers` are classes of a user's own, besides those that are registered.
+    """
+
+    def __init__(self, archive: Archive, steppers: Sequence[type] = ()) -> None:
         self.archive = archive
         header = archive.header
         for what, there, here in (
@@ -109,7 +119,7 @@ class Checkpoint:
             if self.arch not in backend.ARCHES or self.precision not in backend.PRECISIONS:
                 raise ValueError(f"arch {self.arch}, precision {self.precision}")
             self.extra, self.runs = dict(header["extra"]), list(header["runs"])
-            self.steppers = [stepper_from(run["stepper"]) for run in self.runs]
+            self.steppers = [stepper_from(run["stepper"], steppers) for run in self.runs]
             source = f"scene of {archive.path}"
             for data in (*(run["scene"] for run in self.runs), self.extra.get("scene", {})):
                 moved_along(data, dict(header.get("files", {})), archive.path.parent)
@@ -122,6 +132,8 @@ class Checkpoint:
                 raise ValueError(f"time {self.time} is none")
         except CheckpointError:
             raise
+        except StepperError as error:
+            raise CheckpointError(f"{archive.path}: {error}") from None
         except (AttributeError, LookupError, TypeError, ValueError) as error:
             raise archive.error(f"has a header that cannot be used: {error}") from None
 
@@ -132,15 +144,20 @@ class Checkpoint:
                 what = changed_mesh(part["file"], part["sha256"]) if digest else f"mesh file {part['file']!r} is gone"
                 raise CheckpointError(f"{self.archive.path}: {place}: {what}, or start a new run")
 
-    def simulation(self, run: int, scene: Scene | None = None) -> Simulation:
-        """Build simulation number `run` in its present state; `scene`, if given, differs from its own in nothing that counts."""
-        sim = Simulation(scene or self.scenes[run], self.steppers[run], debug=self.runs[run]["debug"])
+    def simulation(self, run: int, scene: Scene | None = None, forces: Sequence[Any] = ()) -> Simulation:
+        """Build simulation number `run` in its present state; `scene`, if given, differs from its own in nothing that counts.
+
+        `forces` are the user's own that it had.
+        """
+        self._require_forces(run, forces)
+        sim = Simulation(scene or self.scenes[run], self.steppers[run], forces=forces, debug=self.runs[run]["debug"])
         self.restore(sim, run)
         return sim
 
     def restore(self, sim: Simulation, run: int = 0) -> None:
-        """Put the state of number `run` into `sim`, which has the same scene and stepper; compiles next to nothing."""
+        """Put the state of number `run` into `sim`, which has the same scene and stepper; compiles almost nothing."""
         data, device = self.runs[run], backend.current()
+        self._require_forces(run, sim.forces)
         if device.precision != self.precision:
             raise CheckpointError(
                 f"{self.archive.path} has precision {self.precision}, and {device.precision} is in use; "
@@ -150,6 +167,21 @@ class Checkpoint:
         with self.archive.trusted_by_nobody():
             self._restore(run, data, state)
         sim.restored()
+
+    def _require_forces(self, run: int, forces: Sequence[Any]) -> None:
+        """Raise `CheckpointError` unless a user's own `forces` are those that run number `run` had."""
+        there, here = self.runs[run].get("forces", []), forces_data(forces)
+        if there == here:
+            return
+        names = [[str(each["name"]) for each in some] for some in (there, here)]
+        if names[0] != names[1]:
+            said = [", ".join(some) or "none" for some in names]
+            raise CheckpointError(
+                f"{self.archive.path} has forces of its user's own: {said[0]}; given are {said[1]}; "
+                f"give the same in the same order, load_checkpoint(..., forces=[...])"
+            )
+        found = "; ".join(f"{a['name']}: {differences(a, b)}" for a, b in zip(there, here, strict=True) if a != b)
+        raise CheckpointError(f"{self.archive.path} has other forces: {found}; give the same values")
 
     def _restore(self, run: int, data: Mapping[str, Any], state: State) -> None:
         self._compare("field", set(data["fields"]), set(state.fields))

@@ -87,9 +87,9 @@ def run_shell(text):
 
 
 def run_python(text, page, folder):
-    """Run a block; one that starts processes in a program of its own, which they import."""
+    """Run a block; in a program of its own if it starts processes, which import it, or has kernels, whose source is looked up."""
     text = TAKEN_FOR_GRANTED.get(page, "") + replaced(text)
-    if "__main__" in text:
+    if "__main__" in text or "ti.func" in text or "ti.data_oriented" in text:
         (folder / "block.py").write_text(text)
         subprocess.run([sys.executable, "block.py"], check=True, timeout=300)
     else:

@@ -13,6 +13,7 @@ from taichi_rts.solver.grid.neighbour_sum import NeighbourSum
 from taichi_rts.solver.grid.sums import make_wall_sum
 from taichi_rts.solver.grid.windows import FluidWindows
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
+from taichi_rts.solver.physics.own_forces import OwnBodies, OwnForces, OwnPairs
 from taichi_rts.solver.physics.timetable import Timetable
 
 
@@ -83,7 +84,7 @@ class MomentumEquation:
     Pressure acts along x_ij; viscosity terms act along x_ij or v_ij, as their `along` says, and share the denominator
     (rho_i + rho_j) (|x_ij|^2 + 0.01 h^2), so that a pair costs one division. A term has two ti.funcs, `fluid_pair(near, i, j,
     x_ij, v_ij, d2)` and `wall_pair(i, b, x_ib, v_ib, d2, wall)`, which return its coefficient per unit of mass times gradient
-    factor (see `smoothing`), a viscosity's times that denominator.
+    factor (see `smoothing`), a viscosity's times that denominator. `own` are forces of a user's own.
     """
 
     def __init__(
@@ -100,11 +101,15 @@ class MomentumEquation:
         *,
         with_rho_rate: bool = False,
         diffusion: Any = None,
+        own: OwnForces | None = None,
     ) -> None:
         self.near = near
         self.gravity = gravity
         self.dim = dim = grid.geometry.dim
         diffuses = diffusion is not None
+        own = own or OwnForces()
+        pairs = OwnPairs(own.pairs, medium)
+        self.own_bodies = OwnBodies(own, grid.geometry)
         self.width = width = dim + int(with_rho_rate) + int(diffuses)
         kernel, mass, rest_density = medium.kernel, medium.mass, medium.rest_density
         tiny, regular = medium.tiny, medium.regular
@@ -144,7 +149,12 @@ class MomentumEquation:
             if ti.static(diffuses):
                 spread = diffusion.fluid_pair(near, i, j, x_ij, d2)
             pushed = pressure.fluid_pair(near, i, j, x_ij, v_ij, d2)
-            return mass * rates(pushed, along_x, along_v, spread, x_ij, v_ij, d2, near.rho[i] + near.rho[j])
+            total = mass * rates(pushed, along_x, along_v, spread, x_ij, v_ij, d2, near.rho[i] + near.rho[j])
+            if ti.static(len(own.pairs) > 0):
+                drawn = pairs.fluid_pair(near, i, j, x_ij, v_ij, d2)
+                for e in ti.static(range(dim)):
+                    total[e] += drawn[e]
+            return total
 
         @ti.func
         def push(i, b, wall: ti.template()):
@@ -157,9 +167,14 @@ class MomentumEquation:
             for term in ti.static(sideways):
                 along_v += term.wall_pair(i, b, x_ib, v_ib, d2, wall)
             pushed = pressure.wall_pair(i, b, x_ib, v_ib, d2, wall)
-            return (
+            total = (
                 rest_density * wall.volume[b] * rates(pushed, along_x, along_v, 0.0, x_ib, v_ib, d2, 2.0 * near.rho[i])
             )
+            if ti.static(len(own.pairs) > 0):
+                drawn = pairs.wall_pair(i, b, x_ib, v_ib, d2, wall)
+                for e in ti.static(range(dim)):
+                    total[e] += drawn[e]
+            return total
 
         def wall_pair(wall: Any) -> Any:
             @ti.func
@@ -183,7 +198,12 @@ class MomentumEquation:
         self.moving = [wall for wall in walls if wall.moves]
         names = ["x", "v", "rho", "p_over_rho2", *(["viscosity"] if near.has_viscosity else [])]
         layered = any(wall.layered for wall in walls if not wall.moves)
-        wall_names = ["x", "volume", *(["normal"] if sideways else []), *(["depths"] if sideways and layered else [])]
+        wall_names = [
+            "x",
+            "volume",
+            *(["normal"] if sideways or own.pairs else []),
+            *(["depths"] if sideways and layered else []),
+        ]
         self.sum = NeighbourSum(fluid_pair, wall_pair, width, names, wall_names, near, grid, windows, walls, backend)
         self.wall_power = make_wall_sum(self.moving, grid, power_pair, 1, backend)
         """Power [W/kg] of moving walls on the particle at a place, (1,): their accelerations times their velocities."""
@@ -195,4 +215,8 @@ class MomentumEquation:
         outer = self.gravity.acceleration(self.near.x[k], now, tick)
         for d in ti.static(range(self.dim)):
             total[d] += outer[d]
+        if ti.static(len(self.own_bodies.bodies) > 0):
+            drawn = self.own_bodies.acceleration(self.near.x[k], now, tick)
+            for d in ti.static(range(self.dim)):
+                total[d] += drawn[d]
         return total

@@ -1,3 +1,4 @@
+import dataclasses
 import hashlib
 import json
 import subprocess
@@ -148,7 +149,7 @@ def test_every_option_of_the_asynchronous_stepper_can_be_given():
     wanted = rts.Asynchronous(0.8, 6, "integers", 0.1, limiter=False, inactive_density="stale", stagger=7)
     assert parse("--stepper", "asynchronous", *args).make_stepper() == wanted
     assert parse("--limiter", "True").make_stepper() == rts.Regional(preset="paper", limiter=True)
-    assert set(rts.Asynchronous.__dataclass_fields__) - {"name"} <= set(STEPPER_OPTIONS)
+    assert {field.name for field in dataclasses.fields(rts.Asynchronous)} <= set(STEPPER_OPTIONS)
 
 
 def test_panels_have_their_own_steppers():
