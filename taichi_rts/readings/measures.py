@@ -13,6 +13,7 @@ from taichi_rts.scene.geometry.periodic import nearest_image, periods
 from taichi_rts.scene.near_pairs import near_pairs
 from taichi_rts.scene.parts.conditions import AXES, face_axis
 from taichi_rts.scene.scene import Scene
+from taichi_rts.solver.physics.continuity import rise_of_pressure, with_image
 
 FRONT_RANK = 5
 """The front is the FRONT_RANK-th largest x, so that single drops that fly ahead do not count."""
@@ -85,9 +86,10 @@ def water_height(scene: Scene, medium: Medium, x: np.ndarray, position: np.ndarr
 class FaceForces:
     """Forces of the water's pressure on the faces of the domain's box: the reaction to what the walls do to the fluid.
 
-    F_b = -sum_i m rho_0 V_b (c_i + c_ib) grad W_ib with c_i = p_i/rho_i^2 (Akinci et al. 2012, Eq. 9) and c_ib what
-    `MirroredPressure` adds where density is integrated, else 0. A face has the component along its normal of all wall particles
-    behind it, so that those behind an edge count for both faces. Friction on the walls is not in it.
+    F_b = -sum_i m rho_0 V_b (c_i + c_ib) grad W_ib with c_i = p_i/rho_i^2 (Akinci et al. 2012, Eq. 9) and c_ib that of the
+    image where density is integrated (`with_image`, as `MirroredPressure` has it), else 0. A face has the component along its
+    normal of all wall particles behind it, so that those behind an edge count for both faces. Friction on the walls is not in
+    it.
     """
 
     def __init__(self, scene: Scene, medium: Medium) -> None:
@@ -126,7 +128,7 @@ class FaceForces:
         places = layer.positions.copy()
         for number, wall in enumerate(scene.moving_walls):
             places[self.owners == number, face_axis(wall.face)] += wall.displacement(time)
-        slope = np.zeros(scene.dim) if scene.gravity_changes else -np.asarray(scene.acceleration) / scene.rest_density
+        rise = np.array(rise_of_pressure(scene))
         near = self._near_walls(places, x)
         x, own = x[near].astype(np.float64), p[near].astype(np.float64) / rho[near].astype(np.float64) ** 2
         forces = np.zeros_like(places)
@@ -134,7 +136,7 @@ class FaceForces:
             gap, distance = x[i] - places[b], np.sqrt(distance2)
             push = own[i]
             if scene.density == "continuity":
-                push = push + np.maximum(push + gap @ slope, 0.0)
+                push = with_image(push, gap @ rise, np.maximum)
             push = (
                 push * layer.volumes[b] * np.interp(distance, self.distances, self.slopes) / np.maximum(distance, 1e-12)
             )

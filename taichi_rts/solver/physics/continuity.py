@@ -62,6 +62,22 @@ class ContinuityDensity(Density):
         return self.particles.rho[i] + self.near.elapsed[k] * (total + self.particles.diffusion[i])
 
 
+def rise_of_pressure(scene: Scene) -> tuple[float, ...]:
+    """-g/rho_0 [m^4/(kg s^2)], (dim,): how p/rho_0^2 rises in water at rest; 0 where gravity changes."""
+    return tuple(0.0 if scene.gravity_changes else -g / scene.rest_density for g in scene.acceleration)
+
+
+def with_image(own, rise, larger: ti.template()):
+    """p_i/rho_i^2 of a particle and that of its image in the wall, where the water between them adds `rise`.
+
+    In NumPy and, as `_with_image`, in kernels: `larger` is the maximum of the one or the other.
+    """
+    return own + larger(own + rise, 0.0)
+
+
+_with_image = ti.func(with_image)
+
+
 @ti.data_oriented
 class MirroredPressure(Pressure):
     """Pressure against walls that have the pressure of the particle they push, and below it that of the water between.
@@ -74,14 +90,12 @@ class MirroredPressure(Pressure):
 
     def __init__(self, near: Neighbourhood, scene: Scene) -> None:
         super().__init__(near)
-        changes = bool(scene.gravity_changes)
-        self.slope = tuple(0.0 if changes else -g / scene.rest_density for g in scene.acceleration)
+        self.rise = rise_of_pressure(scene)
 
     @ti.func
     def wall_pair(self, i, b, x_ib, v_ib, d2, wall: ti.template()):
         """Acceleration along x_ib per unit of rho_0 V_b times the gradient factor."""
-        own = self.near.p_over_rho2[i]
-        return -(own + ti.max(own + ti.Vector(self.slope).dot(x_ib), 0.0))
+        return -_with_image(self.near.p_over_rho2[i], ti.Vector(self.rise).dot(x_ib), ti.max)
 
 
 @ti.data_oriented
