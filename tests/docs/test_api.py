@@ -10,7 +10,7 @@ from pathlib import Path
 import taichi_rts as rts
 
 API = Path(__file__).parents[2] / "docs" / "api.py"
-DIMENSIONLESS = {"longest_courant", "drift"}
+DIMENSIONLESS = {"longest_courant", "own_courant", "equal_step", "drift"}
 
 
 def classes():

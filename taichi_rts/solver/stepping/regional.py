@@ -23,7 +23,7 @@ from taichi_rts.solver.stepping.validity import ValidityByParticle
 
 LARGEST_COURANT = 0.6
 """Courant number of the longest step at the defaults. Still pools are as calm as at 0.4, and errors in dam breaks no larger; at
-0.7 pools move twice as much, at 0.8 they simmer (`docs/defaults.md`)."""
+0.7 pools move twice as much, at 0.8 they simmer (`docs/evidence/defaults.md`)."""
 
 MOST_LEVELS = 32
 PRESETS: dict[str | None, dict[str, Any]] = {
@@ -38,7 +38,7 @@ PRESETS: dict[str | None, dict[str, Any]] = {
         "beta_decay": 0.2,
     },
 }
-"""The paper asks for lambda_f <= 0.25. At 0.25 a double dam break gains 2.2 % of energy, at 0.1 0.1 % (docs/defaults.md)."""
+"""The paper asks for lambda_f <= 0.25. At 0.25 a double dam break gains 2.2 % of energy, at 0.1 0.1 % (docs/evidence/defaults.md)."""
 REGIONAL_SOUND: dict[str, Any] = {
     "courant": 0.4,
     "strict_cfl": False,
@@ -53,7 +53,9 @@ At a courant of 0.6 pools are as calm, but one of 1 m stands 1.1 % too low after
 """
 FROM_LEVELS: dict[str, Any] = {
     "courant": lambda levels: LARGEST_COURANT / levels if levels > 1 else ONE_STEP_COURANT,
-    "limiter": lambda levels: levels > 2,  # with two levels it changes nothing but the work (docs/asynchronous.md)
+    "limiter": lambda levels: (
+        levels > 2
+    ),  # with two levels it changes nothing but the work (docs/evidence/asynchronous.md)
     "steps": lambda levels: "half_octaves" if levels in lengths("half_octaves", levels) else "integers",
 }
 
