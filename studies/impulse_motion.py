@@ -134,7 +134,7 @@ class ImpulseMotion(Motion):
 
     @ti.kernel
     def mark(self, due: ti.template(), now: ti.i32, tick: float):
-        """Note who is due, when each was evaluated last, and when he was and is planned to be next."""
+        """Note which particles are due, when each was evaluated last, and when it was and is planned to be next."""
         self.now[None], self.tick[None] = now, tick
         for m in range(self.grid.occupied_count[None]):
             block = self.grid.occupied[m]

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 import taichi_rts as rts
 from taichi_rts.sampling.lining import line_solid
-from taichi_rts.scene.geometry.making import make_solid
+from taichi_rts.scene.obstacles.making import make_solid
 
 MESHES = Path(__file__).parents[1] / "assets" / "obstacles"
 S = 0.02

@@ -1,4 +1,7 @@
-"""Spatially varying time stepping for weakly compressible SPH, on Taichi. Importing starts nothing; call `init`."""
+"""Spatially varying time stepping for weakly compressible SPH, on Taichi. Importing starts nothing; call `init`.
+
+`ti` is the Taichi, or the fork of it, that is used: for own kernels.
+"""
 
 from taichi_rts.device.backend import init, ti  # first: it keeps Taichi from printing its banner
 
@@ -23,20 +26,19 @@ from taichi_rts.output.export import Exporter, write_particles
 from taichi_rts.output.series import Series
 from taichi_rts.particle_files.formats import read_particles
 from taichi_rts.particle_files.frame import ParticleFrame
+from taichi_rts.scene.fluids.block import Block
+from taichi_rts.scene.fluids.particles import Particles
+from taichi_rts.scene.fluids.sphere import Sphere
 from taichi_rts.scene.loading import load_scene, scene_names, scene_schema
+from taichi_rts.scene.obstacles.box import BoxObstacle
+from taichi_rts.scene.obstacles.cylinder import CylinderObstacle
+from taichi_rts.scene.obstacles.mesh import MeshObstacle
+from taichi_rts.scene.obstacles.motion import ConstantMotion, Keyframes
+from taichi_rts.scene.obstacles.polygon import PolygonObstacle
+from taichi_rts.scene.obstacles.sphere import SphereObstacle
+from taichi_rts.scene.parts.box import Box
 from taichi_rts.scene.parts.conditions import GravityChange, Inflow, MovingWall, Outlet
-from taichi_rts.scene.parts.obstacles import (
-    BoxObstacle,
-    ConstantMotion,
-    CylinderObstacle,
-    Keyframes,
-    MeshObstacle,
-    PolygonObstacle,
-    SphereObstacle,
-)
-from taichi_rts.scene.parts.particles import Particles
 from taichi_rts.scene.parts.probes import Gauge, Probe
-from taichi_rts.scene.parts.shapes import Block, Box, Sphere
 from taichi_rts.scene.parts.sound import RegionalSound
 from taichi_rts.scene.parts.velocities import LinearField, StandingWave, TaylorGreen
 from taichi_rts.scene.parts.view import View

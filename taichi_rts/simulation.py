@@ -37,7 +37,11 @@ OnFrame = Callable[["Simulation"], object]
 
 
 def _part(name: str) -> Any:
-    return property(lambda sim: getattr(sim.solver, name))
+    def part(sim: Any) -> Any:
+        return getattr(sim.solver, name)
+
+    part.__doc__ = f"The `{name}` of the run's solver."
+    return property(part)
 
 
 @guarded("time", "count", "removed_count", "keeps_work", "keeps_momentum_budget")
@@ -334,7 +338,7 @@ class Simulation:
     def statistics(self) -> dict[str, Any]:
         """Work so far: base_steps, particle_updates, wall_seconds, active_fraction, level_fractions and more.
 
-        `overhead_fraction` is the share of a step in which all are due that everybody pays (grid, regions, prediction),
+        `overhead_fraction` is the share of a full step that is spent for all particles (grid, regions, prediction),
         measured on a sample of the steps. `stopped_by_domain` and `stopped_by_obstacles` count centres that a face of the
         domain or an obstacle had to stop, `removed_by_outlets` particles that each outlet has taken out, `runaways` speeds
         and accelerations that had to be limited because the run has blown up.

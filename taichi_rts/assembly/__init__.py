@@ -1,1 +1,1 @@
-"""From a scene and a stepper to a run, and what is asked of a run as a whole."""
+"""Builds a run from a scene and a stepper, and answers what concerns a run as a whole."""

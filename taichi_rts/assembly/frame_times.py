@@ -1,4 +1,4 @@
-"""When a run is looked at."""
+"""The times of a run's frames."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What a simulation remembers: every field and every plain value it is made of, found by walking through its parts.
+"""The state of a simulation: every field and every plain value of its parts, found by walking through them.
 
-Nobody keeps a list: what a part has is kept, unless its class says under `transient` that it holds nothing between two steps, or
-nothing that the scene and the stepper do not give again. What someone forgets to say costs a few bytes, not the bits of a run.
+No list is kept by hand: every attribute of a part is saved, unless its class names it in `transient`, because it holds nothing
+between two steps or follows from the scene and the stepper. An entry forgotten there costs a few bytes, not the bits of a run.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def parts(root: Any, kind: type) -> list[Any]:
 
 
 def transient_names(kind: type) -> frozenset[str]:
-    """Names that a class and those it derives from call transient."""
+    """Names that a class and its base classes list in `transient`."""
     return frozenset(name for cls in kind.__mro__ for name in vars(cls).get("transient", ()))
 
 
@@ -96,7 +96,7 @@ def is_frozen(thing: Any) -> bool:
 
 
 def is_plain(value: Any) -> bool:
-    """Whether `value` is a number, a text, an array, or made of such."""
+    """Whether `value` is a number, a text, an array, or consists of such."""
     if isinstance(value, (list, tuple)):
         return all(is_plain(each) for each in value)
     if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""Forces and torques of the fluid on obstacles, worked out only when somebody asks."""
+"""Forces and torques of the fluid on obstacles, computed only when asked for."""
 
 from typing import Any, NamedTuple
 
@@ -7,8 +7,8 @@ import numpy as np
 from taichi_rts.device.backend import Backend, ti
 from taichi_rts.sampling.walls import WallLayer
 from taichi_rts.scene.geometry.bodies import bodies
-from taichi_rts.scene.geometry.making import make_solid
 from taichi_rts.scene.geometry.periodic import nearest_image, periods
+from taichi_rts.scene.obstacles.making import make_solid
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.sums import make_wall_sum
 from taichi_rts.solver.motion.motion import Motion
@@ -29,7 +29,7 @@ class ObstacleForces(NamedTuple):
 
 @ti.data_oriented
 class ForceMeter:
-    """Sums what the wall particles of each obstacle do to the fluid, with the sign turned round (Newton's third law).
+    """Sums the forces of each obstacle's wall particles on the fluid, with the opposite sign (Newton's third law).
 
     The pair forces are those of the momentum equation: pressure and viscosity. Obstacles at rest, whose particles are part of
     the walls at rest in a step, get `Walls` of their own here.
@@ -57,7 +57,9 @@ class ForceMeter:
         particles, dim = self.motion.particles, self.scene.dim
         self.motion.predict_neighbourhood(self.everywhere, now, tick)
         self.observe(now, tick)
-        rates = np.zeros((len(self.sums), particles.born, dim), self.dtype)  # zeros of who has gone add nothing
+        rates = np.zeros(
+            (len(self.sums), particles.born, dim), self.dtype
+        )  # zeros of particles that have left add nothing
         places = np.zeros((particles.born, dim), self.dtype)
         self.collect(rates, places)
         push = -mass * rates.astype(np.float64)

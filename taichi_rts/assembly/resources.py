@@ -1,4 +1,4 @@
-"""What a run needs, compared with what there is before anything is allocated: memory, and ticks of its clock."""
+"""Compares what a run needs with what is available, before anything is allocated: memory, and ticks of its clock."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from taichi_rts.device.backend import Backend, has_vulkan_hardware
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.errors import ResourceError
 from taichi_rts.scene.checks.size import finest_spacing, size_of
-from taichi_rts.scene.geometry.making import make_solid
-from taichi_rts.scene.geometry.solid import grid_nodes
+from taichi_rts.scene.obstacles.making import make_solid
+from taichi_rts.scene.obstacles.solid import grid_nodes
 from taichi_rts.scene.placing import origin_of, translated
 from taichi_rts.solver.grid import resorting
 from taichi_rts.solver.grid.windows import entries, room
@@ -31,7 +31,7 @@ TABULATING = 100
 LINING = 10 * SAMPLING
 """Bytes of the host per boundary particle of an obstacle and dimension: they are chosen from about ten times as many points."""
 COMPILED = 400 << 20
-"""Bytes that Python, the compiler and compiled kernels take besides."""
+"""Bytes that Python, the compiler and compiled kernels take in addition."""
 FIXED = 1 << 14
 """Bytes of fields whose size does not depend on the scene, about."""
 WALL_SHARE = 0.45
@@ -39,12 +39,13 @@ WALL_SHARE = 0.45
 SOUND_REALS = 9
 """Fields of reals with an entry for each block that a regional sound speed needs."""
 MOST_ADDRESSED = 2**32 - 1
-"""Bytes of one buffer on Vulkan and Metal, at most: kernels in SPIR-V reckon with 32-bit addresses, beyond which they wrap round.
+"""Bytes of one buffer on Vulkan and Metal, at most: kernels in SPIR-V compute 32-bit addresses, which wrap round beyond
+that.
 
 Taichi puts all fields that are made between two launches of kernels into one buffer, one behind the other.
 """
 SINGLE, DOUBLE = 2.0**-24, 2.0**-53
-"""By which share of itself a number is rounded at most."""
+"""Largest relative error of rounding a number."""
 FINEST_POSITION = 0.001
 """Share of the spacing by which positions may be rounded: a still pool then moves half as fast again
 (docs/evidence/reliability.md)."""
@@ -138,7 +139,7 @@ def _lining(scene: Scene, spacing: float | None) -> float:
 
 
 def free_host_memory() -> float:
-    """Bytes that this process may still take: what the system has available, or less in a container; infinite if nobody says."""
+    """Bytes that this process may still take: what the system has available, or less in a container; infinite if unknown."""
     found = [math.inf]
     with contextlib.suppress(OSError, ValueError):
         facts = dict(line.split(":") for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines())
@@ -236,7 +237,7 @@ def require_clock(scene: Scene, stepper: Any, end_time: float | None = None) -> 
 
 
 def require_resolution(scene: Scene, precision: str) -> None:
-    """Raise `ResourceError` if the spacing is too fine for how coarsely positions in the domain are rounded.
+    """Raise `ResourceError` if positions in the domain are rounded too coarsely for the spacing.
 
     A run counts them from `origin_of` the scene, so what counts is the domain's size. The scene's own numbers, and what is read
     of the run, are in double precision and count from 0.
@@ -269,9 +270,9 @@ def require(scene: Scene, steppers: Iterable[Any], backend: Backend, *, debug: b
     steppers = list(steppers)
     for stepper in steppers:
         require_clock(scene, stepper)
-    require_resolution(scene, backend.precision)
     require_addresses(scene, steppers, backend, debug=debug)
     require_memory(scene, steppers, backend, debug=debug, pictures=pictures)
+    require_resolution(scene, backend.precision)  # last: its remedy, double precision, takes more memory
 
 
 def text(count: float) -> str:

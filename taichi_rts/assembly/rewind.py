@@ -1,4 +1,4 @@
-"""Setting a simulation back to its start, so that it can be timed again without being compiled again."""
+"""Resets a simulation to its start, so that it can be timed again without compiling."""
 
 import copy
 import math

@@ -16,7 +16,7 @@ from taichi_rts.solver.physics.timetable import LAST
 class Snapshot:
     """What any stepper needs to go on from `time` [s], in host memory; arrays are in order of the stable `ids`, (N,).
 
-    Accelerations and steps are not in it: as at the start, everybody is due in the first step.
+    Accelerations and steps are not in it: as at the start, all particles are due in the first step.
 
     Attributes:
         positions, velocities: (N, dim) [m], counted from `Simulation.origin`, and [m/s].

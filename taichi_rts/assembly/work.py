@@ -1,4 +1,4 @@
-"""What a run is judged by: energy, momentum, and how much work each level did."""
+"""How much work a run did: counts by level, and the share of a step that is done for all particles."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Tally:
     levels: int
     base_steps: int = 0
     possible: int = 0
-    """Updates if everybody had been updated in every base step."""
+    """Updates if every particle had been updated in every base step."""
     wall_seconds: float = 0.0
     particle_steps: list[int] = field(default_factory=list)
     updates: list[int] = field(default_factory=list)
@@ -29,13 +29,13 @@ class Tally:
         self.updates = [0] * self.levels
 
     def add(self, steps: int, count: int, particle_steps: Sequence[int], updates: Sequence[int]) -> None:
-        """Add `steps` steps of `count` particles with their counts per level; empty ones stand for everybody at level 1."""
+        """Add `steps` steps of `count` particles with their counts per level; empty ones mean all particles at level 1."""
         self.base_steps += steps
         self.possible += steps * count
-        everybody = [steps * count]
-        for k, n in enumerate(particle_steps or everybody):
+        all_at_first = [steps * count]
+        for k, n in enumerate(particle_steps or all_at_first):
             self.particle_steps[k] += n
-        for k, n in enumerate(updates or everybody):
+        for k, n in enumerate(updates or all_at_first):
             self.updates[k] += n
 
     @property
@@ -77,12 +77,12 @@ class Stopwatch:
 
 
 class Overhead:
-    """Measures what everybody pays in a step against what the due particles pay, on every `EVERY`-th step.
+    """Measures the work for all particles in a step against that for the due particles, on every `EVERY`-th step.
 
     Waiting for the device costs a GPU a little, so only a sample is timed.
     """
 
-    EVERY = 61  # prime, or it would meet the same pass of every cycle
+    EVERY = 61  # prime, or it would always sample the same pass of a cycle
 
     def __init__(self, particles: Particles) -> None:
         self.particles = particles
@@ -117,7 +117,7 @@ class Overhead:
 def speedup_bound(active_fraction: float, overhead_fraction: float, passes: float = 1.0) -> float:
     """Upper bound for the speed-up over uniform steps of the base step: 1 / (e p + (1-e) a).
 
-    `active_fraction` a holds sum_n f_n/n and the recomputation by pre-emption; `overhead_fraction` e is paid by all in each
-    of the p `passes` of a base step.
+    `active_fraction` a holds sum_n f_n/n and the recomputation by pre-emption; `overhead_fraction` e is the share of
+    the work that is done for all particles in each of the p `passes` of a base step.
     """
     return 1.0 / (overhead_fraction * passes + (1.0 - overhead_fraction) * active_fraction)

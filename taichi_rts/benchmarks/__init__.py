@@ -1,1 +1,3 @@
-"""How fast the solver is, beside a peer and beside its own bars: `python -m taichi_rts.benchmarks`, `taichi-rts bench`."""
+"""How fast the solver is, compared with another code and with the project's targets: `python -m taichi_rts.benchmarks`,
+`taichi-rts bench`.
+"""

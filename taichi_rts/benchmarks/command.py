@@ -90,7 +90,7 @@ def table(rows: list[Row]) -> Table:
 
 
 def verdict(row: Row) -> str:
-    """Say whether a bar is met."""
+    """Say whether a target is met."""
     if not row.bar:
         return ""
     sign, limit = row.bar.split()

@@ -1,4 +1,4 @@
-"""What is measured on a CPU: each function returns rows of the table. Bars are those of the project's issue on speed."""
+"""What is measured on a CPU: each function returns rows of the table. Bars are the project's targets for speed."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SETTLED = 0.05  # [s]: the column has left its lattice
 
 @dataclass(frozen=True)
 class Row:
-    """One figure: what, of what size, its value and unit, and the bar it is held against ("" if none).
+    """One figure: what is measured, at which size, its value and unit, and its target ("" if none).
 
     `particles` is the number where the figure belongs to a curve over it.
     """
@@ -146,7 +146,8 @@ def simulated_second(settings: Settings) -> Iterator[Row]:
 def regional_against_uniform(settings: Settings) -> Iterator[Row]:
     """The paper's preset against uniform steps of the same base step, in windows from the release to after the impact.
 
-    As the paper says it, and with steps that end at multiples of themselves: then blocks of one level are due together, in long
+    In the paper's scheme, and with steps that end at multiples of their own length: then blocks of one level are due
+    together, in long
     runs, instead of every second block at a time.
     """
     for name, bar, times in (
@@ -173,7 +174,7 @@ def regional_against_uniform(settings: Settings) -> Iterator[Row]:
 
 
 def one_level(settings: Settings) -> Iterator[Row]:
-    """What regions cost where all have one level."""
+    """The cost of regions where all blocks have one level."""
     settings.start()
     scene = peers_dam_break(settings.cells(60))
     sims = [rts.Simulation(scene, stepper) for stepper in (rts.Regional(levels=1, courant=0.4), rts.Uniform(0.4))]
@@ -185,7 +186,7 @@ def one_level(settings: Settings) -> Iterator[Row]:
 
 
 def sparse_steps(settings: Settings) -> Iterator[Row]:
-    """What a step costs in which few are due."""
+    """The cost of a step in which few particles are due."""
     settings.start()
     scene = rts.load_scene("projectile", particles=str(settings.particles(100_000))).replace(sound_speed="regional")
     sim = rts.Simulation(scene, rts.Regional(courant=LARGEST_COURANT))

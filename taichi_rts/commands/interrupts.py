@@ -43,4 +43,4 @@ class Interrupts:
     def _handle(self, number: int, frame: FrameType | None) -> None:
         first, self.number = self.number == 0, number
         if not (first and self.deferred):
-            raise KeyboardInterrupt  # perhaps in the middle of a step, whose state is worth nothing
+            raise KeyboardInterrupt  # perhaps in the middle of a step, whose state is of no use

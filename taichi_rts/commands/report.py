@@ -24,9 +24,10 @@ from taichi_rts.simulation import Simulation
 from taichi_rts.terminal import console, rate
 
 NOTABLE_GAIN = 0.01
-"""Share of its energy that a run may gain without a word, as in the conformance tests."""
+"""Share of its energy that a run may gain without a warning, as in the conformance tests."""
 LITTLE_ENERGY = 1e-4
-"""Share of what could move below which the energy at the start is next to none, so that no change is a share of it."""
+"""If the energy at the start is a smaller share of what could move than this, changes are given in J, not in
+percent."""
 
 
 @contextmanager
@@ -100,9 +101,7 @@ def print_table(
     if statistics.get("extrapolations") is not None:
         facts.add_row("extrapolations", str(statistics["extrapolations"]))
     fact = energy_fact(drift, initial_energy, known=sim.keeps_work)
-    if (
-        abs(initial_energy.total) < LITTLE_ENERGY * scale
-    ):  # nothing that is worth a share of it moves at the start, or could fall
+    if abs(initial_energy.total) < LITTLE_ENERGY * scale:  # hardly anything moves at the start, or could fall
         fact = f"{abs(gain):.3g} J; at the start there was next to none"
     facts.add_row("energy " + ("gained" if gain > 0.0 else "dissipated"), fact)
     if work:
@@ -160,7 +159,7 @@ def level_rows(sim: Simulation, statistics: Mapping[str, Any]) -> list[tuple[str
 
 
 def pass_facts(statistics: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return what a stepper that works in passes has to say about them."""
+    """Return facts about the passes of a stepper that works in passes."""
     if "passes" not in statistics:
         return []
     cells = statistics["cells_per_pass"]
@@ -187,7 +186,7 @@ def print_folder(folder: Path, frames: int, files: Mapping[str, Any]) -> None:
 
 
 def print_finished(folder: Path, end_time: float) -> None:
-    """Say that there is nothing to go on with."""
+    """Say that the run is finished already."""
     console.print(
         f"{folder} is finished (t = {end_time:g} s); a later --end-time goes on, --overwrite runs again from the checkpoint",
         soft_wrap=True,

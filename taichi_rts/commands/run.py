@@ -128,7 +128,7 @@ class Run:
     strict: bool = False
     """Exit with 3 if a run has blown up or was not weakly compressible: what the table marks red."""
     debug: bool = False
-    """Check at run time what steppers promise (nobody is extrapolated, somebody steps in every pass); adds up momentum."""
+    """Check at run time what steppers promise (nothing is extrapolated, some particle steps in every pass); adds up momentum."""
     gui: bool = False
     """Watch in a window instead of saving frames (needs Vulkan and a display)."""
 
@@ -269,7 +269,8 @@ NOT_IN_WINDOW = (
     *("panels", "debug", "strict", "resume", "checkpoint_every", "frames", "video", "gif", "export", "attributes"),
     *("views", "quality", "transparent"),
 )
-"""Options of `Run` that a window cannot obey. `export_fps` and `overwrite` say nothing there, but demos set the first."""
+"""Options of `Run` that a window refuses. `export_fps` and `overwrite` have no effect there, but demos set the
+first."""
 DEFAULT_SCENE = "double_dam_break"
 
 
@@ -285,7 +286,7 @@ def check_size(width: int, height: int) -> None:
 
 
 def check_angles(azimuth: float | None, elevation: float | None) -> None:
-    """Raise `OutputError` for a view that there is not."""
+    """Raise `OutputError` for an impossible view."""
     if azimuth is not None and not -360.0 <= azimuth <= 360.0:
         raise OutputError(f"--azimuth {azimuth:g} is no angle from -360 to 360 degrees; try -35")
     if elevation is not None and not -90.0 <= elevation <= 90.0:

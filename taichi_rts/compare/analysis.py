@@ -1,4 +1,4 @@
-"""From the runs to what a reader wants to know: speed-ups over both baselines, the Pareto front, the verdict."""
+"""What follows from the runs: speed-ups over both baselines, the Pareto front, the verdict."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def speedups(
     if bound is not None and run["family"] == "asynchronous":
         bound /= run["stepper"]["levels"]  # the solver's bound is over steps of one tick
     if changes_by(run["family"]):
-        bound = None  # its base step is that of a sound speed which hardly anybody has
+        bound = None  # its base step is that of a sound speed which hardly any particle has
     return {
         "equal_step": over(run["equal_step"]),
         "largest_stable": over(stable["stable"]),

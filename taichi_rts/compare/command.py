@@ -45,8 +45,9 @@ ErrorName = Literal[
 class Compare:
     """Find out which stepper, at which step, is worth it on a scene: error against cost, against a converged reference.
 
-    Writes OUTPUT_DIR/compare.json, compare.csv, work_precision.png and every finished run in runs/. Uniform steps at each
-    regional base step and at the largest stable step are added by themselves. Exit codes: 0 done, 2 wrong input, 130 interrupted.
+    Writes OUTPUT_DIR/compare.json, compare.csv, work_precision.png and every finished run in runs/. Uniform steps at
+    each regional base step and at the largest stable step are added automatically. Exit codes: 0 done, 2 wrong input,
+    130 interrupted.
     """
 
     scene: tyro.conf.Positional[str] = "dam_break_2d"
@@ -76,7 +77,8 @@ class Compare:
     samples: int = 40
     """At how many equal intervals runs are compared."""
     parted: float = PARTED
-    """Relative L2 difference of velocities above which the two references have parted: matched errors are taken up to then."""
+    """Relative L2 difference of velocities above which the two references have diverged: matched errors are taken up to
+    then."""
     repeats: int = 3
     """How many times each run is timed; the median counts."""
     output_dir: Path | None = None

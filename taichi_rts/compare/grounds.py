@@ -1,4 +1,4 @@
-"""What all runs on one scene are measured against."""
+"""What all runs on one scene are compared with."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""One piece of a comparison as plain data, and the functions that a worker process runs. Nothing here knows of errors."""
+"""One piece of a comparison as plain data, and the functions that a worker process runs. Errors are computed
+elsewhere.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run is judged by: every error is one number, computed in NumPy from two trajectories of the same particles.
+"""The errors of a run: each is one number, computed in NumPy from two trajectories of the same particles.
 
 Particles are matched by id; where their number grows during a run, the ids that both runs have are compared. Every error is
 a root mean square over the sample times, so that a single moment does not decide. `docs/compare.md` repeats these definitions.
@@ -21,7 +21,7 @@ from taichi_rts.scene.geometry.periodic import nearest_image
 from taichi_rts.scene.scene import Scene
 
 PARTED = 0.01
-"""Two runs have parted when the relative L2 difference of their velocities exceeds this, by default."""
+"""Two runs have diverged when the relative L2 difference of their velocities exceeds this, by default."""
 
 
 @dataclass(frozen=True)

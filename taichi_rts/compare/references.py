@@ -35,7 +35,7 @@ SOLVER = (
     "simulation.py",
     "solver",
 )
-"""What decides the bits of a run, in the package; only its change makes references anew."""
+"""Parts of the package that decide the bits of a run; only changes to them make references anew."""
 IDLE = ("name", "description", "view")  # of a scene: changes no motion
 
 

@@ -1,4 +1,4 @@
-"""The comparison itself: references, baselines, all variants, and what they amount to."""
+"""The comparison itself: references, baselines and all variants."""
 
 from __future__ import annotations
 

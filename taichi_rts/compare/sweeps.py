@@ -18,7 +18,7 @@ ONE_SOUND_SPEED = tuple(name for name, (_kind, setup) in setups("compared").item
 FIXED = {"courant": "--courants", "preset": "--steppers paper", "end_time": "--end-time"}
 """Parameters that are no sweep, and the option to use instead."""
 SHAPE = ("domain", "fluids", "probes", "gauges", "view", "name", "description")
-"""What makes a scene the scene it is, or changes no motion."""
+"""Fields that define which scene it is, or change no motion."""
 
 
 def kinds() -> dict[str, Any]:

@@ -41,12 +41,12 @@ class Variant:
 
     @property
     def series(self) -> str:
-        """What its line in the plot is called: all but the Courant number."""
+        """Name of its line in the plot: all but the Courant number."""
         return " ".join(part for part in (self.family, sweeps.describe(self.options | self.changes)) if part)
 
     @property
     def label(self) -> str:
-        """What it is called on screen."""
+        """Its name on screen."""
         return f"{self.series} λ={self.courant:.4g}"
 
 

@@ -1,1 +1,1 @@
-"""Taichi and the device: the backend, scans, and what spares the front end work."""
+"""Taichi and the device: the backend, scans, and a cache that spares the front end work."""

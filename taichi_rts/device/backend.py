@@ -96,7 +96,7 @@ class Backend:
 _current: Backend | None = None
 _start_of_current: Start | None = None
 _asked_for = ""
-"""Arch that `init` was given; empty where it uses a Taichi that others have started."""
+"""Arch that `init` was given; empty where it uses a Taichi that was started elsewhere."""
 _options: dict[str, Any] = {}
 _DEFAULT_CACHE = str(ti.lang.impl.default_cfg().offline_cache_file_path)
 

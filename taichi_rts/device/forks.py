@@ -20,8 +20,6 @@ class Fork:
     """Its name for pip; with `_` in place of `-` the module that is imported."""
     requirement: str
     """What pip is to install for it."""
-    prefix: str = "TI"
-    """What the names of its own environment variables begin with."""
     banner: str = "ENABLE_TAICHI_HEADER_PRINT"
     """The environment variable that turns its banner off."""
     options: dict[str, Any] = field(default_factory=dict)
@@ -37,9 +35,9 @@ FORKS = {
     each.module: each
     for each in (
         Fork("taichi", "taichi"),
-        # Its default, compile_tier="balanced", leaves out optimisations that loops over neighbours need: 30 times slower.
+        # Its default, compile_tier="balanced", leaves out optimisations: loops over neighbours took 30 times as long.
         Fork("taichi-forge", "taichi_rts[forge]", options={"compile_tier": "full"}),
-        Fork("quadrants", "taichi_rts[quadrants]", prefix="QD", banner="ENABLE_QUADRANTS_HEADER_PRINT"),
+        Fork("quadrants", "taichi_rts[quadrants]", banner="ENABLE_QUADRANTS_HEADER_PRINT"),
     )
 }
 

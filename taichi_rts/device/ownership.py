@@ -1,4 +1,4 @@
-"""What lives and dies with one start of Taichi: a clear error in place of a crash, once it is gone.
+"""Objects that are lost when Taichi is started again: using them then is a clear error instead of a crash.
 
 Taichi frees all memory when it is started again, has its CPU threads only in the process that started it, and makes fields only
 in the thread that did.
@@ -78,7 +78,7 @@ def require_own_process() -> None:
 
 
 def holds_fields() -> bool:
-    """Whether anything would be lost if Taichi were started again: fields or arrays, of whoever made them."""
+    """Whether anything would be lost if Taichi were started again: fields or arrays, ours or the user's."""
     runtime = _runtime()
     started = program(runtime)
     if started is None:
@@ -131,7 +131,9 @@ def _checked(method: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _forget_in_child() -> None:
-    """In a forked child let go of Taichi's program: to use it, and even to end it, waits for threads that there are not."""
+    """In a forked child drop Taichi's program: using it, or even ending it, would wait for threads that do not exist
+    there.
+    """
     global _lost
     runtime = _runtime()
     started = program(runtime)

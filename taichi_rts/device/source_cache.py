@@ -1,4 +1,4 @@
-"""Spares Taichi's front end what it does again for every call of every function that a kernel inlines: reading its source."""
+"""Spares Taichi's front end from reading the source of a function again at every call that a kernel inlines."""
 
 import functools
 import textwrap

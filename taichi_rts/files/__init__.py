@@ -1,1 +1,1 @@
-"""Files that are whole or not there: writing, locking, archives, films."""
+"""Files that are either complete or absent: writing, locking, archives, films."""

@@ -1,4 +1,4 @@
-"""One file for a header and arrays: an .npz that ends in a checksum of all of it, read without trusting what it says of itself.
+"""One file for a header and arrays: an .npz that ends in a checksum of all of it, read without trusting its content.
 
 NumPy opens it (`np.load`); a header in JSON is the member `header.json`. The checksum stands in the zip's comment, which is its
 last bytes, so that it covers every other byte of the file.
@@ -72,7 +72,7 @@ class Archive:
 
     @contextlib.contextmanager
     def trusted_by_nobody(self) -> Iterator[None]:
-        """Turn whatever odd content brings about inside into a `CheckpointError`: a checksum is no signature."""
+        """Turn every error that malformed content causes into a `CheckpointError`: a checksum is no signature."""
         try:
             yield
         except Error:

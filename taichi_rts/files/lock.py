@@ -24,7 +24,7 @@ NAME, SECOND = ".lock", ".lock.held"
 class FolderLock:
     """Holds a folder for this process, from its making until `release`; the folder is made if need be.
 
-    The system holds the lock (`flock`) and lets go of it when the process ends in whatever way; the file also says which process
+    The system holds the lock (`flock`) and releases it when the process ends in any way; the file also says which process
     has it, for messages, and for folders that hosts share. On Windows, where other processes cannot read what is locked, the lock
     is on a second file (`filelock`). A lock that a dead process of this host left behind is taken over, with a
     warning. Raises `OutputError` if another run has the folder.
@@ -81,7 +81,7 @@ class FolderLock:
                         f"{self.folder} is being written to by process {holder.get('pid')} on {holder.get('host')}; "
                         f"choose another --output-dir, or, if that run is dead, delete {self.path}"
                     )
-                with contextlib.suppress(OSError):  # it may have been deleted by who had it, before this one was locked
+                with contextlib.suppress(OSError):  # its holder may have deleted it before this one was locked
                     if os.path.samestat(os.fstat(self.file), os.stat(self.path)):
                         break
                 self._close()

@@ -27,12 +27,12 @@ class Medium:
 
     @property
     def tiny(self) -> float:
-        """A squared length [m^2] that keeps grad W of a particle on itself, which is zero, from becoming 0/0."""
+        """A squared length [m^2] that keeps grad W of a particle at itself, which is 0, from becoming 0/0."""
         return (1e-6 * self.support) ** 2
 
     @property
     def regular(self) -> float:
-        """0.01 h^2 [m^2] with h = r/2: what keeps viscosity finite where particles meet (Monaghan 1992)."""
+        """0.01 h^2 [m^2] with h = r/2: keeps viscosity finite where particles meet (Monaghan 1992)."""
         return 0.01 * (0.5 * self.support) ** 2
 
     @classmethod

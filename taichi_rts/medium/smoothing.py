@@ -14,7 +14,7 @@ from taichi_rts.device.backend import ti
 
 @ti.func
 def positive(value):
-    """The larger of `value` and 0; an instruction shorter than max, which minds what is not a number."""
+    """The larger of `value` and 0; one instruction less than max, which also handles NaN."""
     return ti.select(value > 0.0, value, 0.0)
 
 

@@ -1,4 +1,4 @@
-"""Stops a run that has blown up, and keeps what tells why: the state before and after, and a diagnosis."""
+"""Stops a run that has blown up, and saves the state before and after, and a diagnosis."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class BlowUpGuard:
                 write_particles(self.folder / f"before{end}.vtu", self._before[key])
             write_particles(self.folder / f"after{end}.vtu", capture(now, tuple(ATTRIBUTES)))
             write_json(self.folder / f"diagnosis{end}.json", plain(self.found[key]))
-        except OutputError:  # what the run has to say is more important than that the disk is full as well
+        except OutputError:  # the diagnosis is more important than the full disk
             self.folder = self.folder.with_name(f"{FOLDER} (which could not be written)")
 
 

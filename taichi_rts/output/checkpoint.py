@@ -1,4 +1,4 @@
-"""Checkpoints: all that decides the bits of what follows, in one file.
+"""Checkpoints: everything that decides the bits of the rest of a run, in one file.
 
 What is in it: every field and plain value of each simulation (`inventory.py`), the scene and the stepper as plain data,
 precision, versions. A simulation is built anew from its scene and its stepper, then its state is put back.
@@ -22,7 +22,7 @@ from taichi_rts.errors import CheckpointError, Error, StepperError
 from taichi_rts.files.archive import Archive, open_archive, write_archive
 from taichi_rts.scene.files.reading import moved_along, parts_with_files, places_beside, require_files_near
 from taichi_rts.scene.loading import scene_from
-from taichi_rts.scene.parts.obstacles import changed_mesh, file_digest
+from taichi_rts.scene.obstacles.mesh import changed_mesh, file_digest
 from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
 from taichi_rts.solver.physics.own_forces import forces_data
@@ -155,7 +155,7 @@ class Checkpoint:
         return sim
 
     def restore(self, sim: Simulation, run: int = 0) -> None:
-        """Put the state of number `run` into `sim`, which has the same scene and stepper; compiles next to nothing."""
+        """Put the state of number `run` into `sim`, which has the same scene and stepper; compiles almost nothing."""
         data, device = self.runs[run], backend.current()
         self._require_forces(run, sim.forces)
         if device.precision != self.precision:

@@ -12,7 +12,7 @@ from taichi_rts.solver.stepping.uniform import Uniform
 
 @dataclass(frozen=True)
 class Panel:
-    """One panel: what it says above it, who steps, and what it changes of the picture's options."""
+    """One panel: its caption, its stepper, and what it changes in the picture's options."""
 
     caption: str
     stepper: Any

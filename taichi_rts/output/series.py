@@ -1,4 +1,4 @@
-"""What changes with time in numbers: a CSV file with a row for each frame."""
+"""The time series of a run: a CSV file with a row for each frame."""
 
 from __future__ import annotations
 

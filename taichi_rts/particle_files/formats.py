@@ -87,6 +87,6 @@ def read_particles(path: str | Path) -> ParticleFrame:
         raise SceneError(f"particle file {str(path)!r} cannot be read: {error.strerror}; check the path") from None
     try:
         return read(data)
-    except Exception as error:  # whatever a damaged file can bring about
+    except Exception as error:  # any error that a damaged file can cause
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise SceneError(f"particle file {str(path)!r} is not a whole {path.suffix} file: {reason}") from None

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from taichi_rts.scene.geometry.bodies import bodies
-from taichi_rts.scene.geometry.making import make_solid
-from taichi_rts.scene.geometry.solid import Solid
+from taichi_rts.scene.obstacles.making import make_solid
+from taichi_rts.scene.obstacles.solid import Solid
 from taichi_rts.scene.scene import Scene
 
 COLOUR = (0.55, 0.54, 0.52)  # sRGB, of none of the palettes

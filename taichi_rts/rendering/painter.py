@@ -13,7 +13,6 @@ from taichi_rts.readings.reading import Readable, Reading
 from taichi_rts.rendering import colours, legend
 from taichi_rts.rendering.camera import Camera
 from taichi_rts.rendering.obstacles import ObstaclePoints
-from taichi_rts.rendering.splatter import Splatter
 from taichi_rts.rendering.tints import Tints
 from taichi_rts.scene.placing import at_origin
 from taichi_rts.scene.scene import Scene
@@ -68,6 +67,10 @@ def make_renderer(options: PictureOptions) -> Any:
         from taichi_rts.rendering.ggui import GguiRenderer  # only here, because it needs Vulkan
 
         return GguiRenderer(*options.view_size)
+    from taichi_rts.rendering.splatter import (
+        Splatter,
+    )  # only here: its kernels are a third of what pictures take to import
+
     return Splatter(*options.view_size, quality=options.quality, transparent=options.transparent)
 
 

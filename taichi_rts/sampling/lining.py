@@ -6,7 +6,7 @@ import functools
 
 import numpy as np
 
-from taichi_rts.scene.geometry.solid import Solid
+from taichi_rts.scene.obstacles.solid import Solid
 
 FINE = {2: 24, 3: 6}
 """Points of the surface per spacing, from which the wall particles are chosen, by dimension."""
@@ -15,7 +15,7 @@ CLOSEST = {2: 0.75, 3: 0.83}
 dimension they cover 0.7476 of a line (Renyi 1958), in two their number is 0.70 per squared distance (measured)."""
 SWEEPS = {2: 60, 3: 15}  # of Lloyd's relaxation
 BLUNT = 0.3
-"""Least depth of a wall particle over the deepest: none stands on a sharp edge, where it would hold fluid off."""
+"""Least depth of a wall particle over the deepest: none lies on a sharp edge, where it would keep fluid away."""
 RANGE = 2.2
 """How far [spacings] neighbours count in a particle's share of the surface."""
 

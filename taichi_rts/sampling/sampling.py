@@ -10,12 +10,13 @@ import numpy as np
 
 from taichi_rts.medium.equation_of_state import Tait
 from taichi_rts.medium.smoothing import lattice_sum, make_kernel
-from taichi_rts.sampling.walls import WallLayer, line_obstacles, line_walls, product
-from taichi_rts.scene.geometry.making import make_solid
-from taichi_rts.scene.geometry.solid import Solid
+from taichi_rts.sampling.walls import WallLayer, line_obstacles, line_walls
+from taichi_rts.scene.fluids.block import Block
+from taichi_rts.scene.fluids.particles import Particles
+from taichi_rts.scene.fluids.shape import FluidShape
+from taichi_rts.scene.obstacles.making import make_solid
+from taichi_rts.scene.obstacles.solid import Solid
 from taichi_rts.scene.parts.conditions import Inflow
-from taichi_rts.scene.parts.particles import Particles
-from taichi_rts.scene.parts.shapes import Block, Sphere, velocities
 from taichi_rts.scene.scene import Scene
 
 
@@ -42,8 +43,8 @@ class Sample:
 def sample(scene: Scene) -> Sample:
     """Fill the scene's fluids with a lattice, but not where obstacles are, and line its walls and obstacles."""
     solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
-    positions = [keep_outside(scene, solids, fill(scene, fluid)) for fluid in scene.fluids]
-    moving = [velocities(fluid, x) for fluid, x in zip(scene.fluids, positions, strict=True)]
+    positions = [keep_outside(scene, solids, fluid.fill(scene.spacing, scene.domain)) for fluid in scene.fluids]
+    moving = [fluid.velocities_at(x) for fluid, x in zip(scene.fluids, positions, strict=True)]
     pressed = [compress(scene, fluid, x) for fluid, x in zip(scene.fluids, positions, strict=True)]
     viscosities = [np.full(len(x), nu) for x, nu in zip(positions, scene.viscosities, strict=False)]
     return Sample(
@@ -58,7 +59,7 @@ def sample(scene: Scene) -> Sample:
     )
 
 
-def compress(scene: Scene, fluid: Block | Sphere | Particles, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def compress(scene: Scene, fluid: FluidShape, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions `x` [m], (N, dim), and densities [kg/m^3], (N,), under the hydrostatic pressure of the fluid's own column.
 
     p = rho_0 g (H - z), and every layer sinks by what those below it give way: g (H z - z^2/2)/c_s^2 at height z over the
@@ -84,7 +85,7 @@ def fill_patch(scene: Scene, inflow: Inflow) -> np.ndarray:
     """Positions [m], (N, dim), of the layer of particles that an inflow lets in at once, on its patch."""
     half = 0.5 * scene.spacing * np.eye(scene.dim)[inflow.axis]
     lower, upper = np.asarray(inflow.lower) - half, np.asarray(inflow.upper) + half
-    return fill_block(scene, Block(tuple(lower), tuple(upper)))
+    return Block(tuple(lower), tuple(upper)).fill(scene.spacing, scene.domain)
 
 
 def calibrate_mass(scene: Scene) -> float:
@@ -94,41 +95,6 @@ def calibrate_mass(scene: Scene) -> float:
     """
     kernel = make_kernel(scene.kernel, scene.dim, scene.support)
     return scene.rest_density / lattice_sum(kernel, scene.dim, scene.spacing)
-
-
-def fill(scene: Scene, fluid: Block | Sphere | Particles) -> np.ndarray:
-    """Positions [m], (N, dim), of a fluid's particles."""
-    if isinstance(fluid, Particles):
-        return np.clip(fluid.positions, scene.domain.lower, scene.domain.upper)  # rounding may have put one beyond
-    return fill_sphere(scene, fluid) if isinstance(fluid, Sphere) else fill_block(scene, fluid)
-
-
-def fill_block(scene: Scene, block: Block) -> np.ndarray:
-    """Positions [m], (N, dim), of a lattice of the scene's spacing whose cells all lie inside the block.
-
-    A size that is no multiple of the spacing leaves a gap of less than one spacing, never an overlap: the lattice sits
-    at the face that touches a wall of the domain (the lower one if both or none do), so that it rests there.
-    """
-    axes = []
-    for a, b, low, high in zip(block.lower, block.upper, scene.domain.lower, scene.domain.upper, strict=True):
-        count = max(1, math.floor((b - a) / scene.spacing * (1 + 1e-9) + 1e-6))
-        tolerance = 1e-6 * scene.spacing
-        at_upper_wall = abs(b - high) < tolerance and abs(a - low) >= tolerance
-        start = b - count * scene.spacing if at_upper_wall else a
-        axes.append(start + (np.arange(count) + 0.5) * scene.spacing)
-    return product(axes)
-
-
-def fill_sphere(scene: Scene, sphere: Sphere) -> np.ndarray:
-    """Positions [m], (N, dim), of a lattice of the scene's spacing that lie inside the sphere.
-
-    The lattice's cells meet at the centre, so it has the centre's mirror symmetries. A cell counts whole if its middle is
-    inside, so the surface is a staircase, but N s^dim is the volume to within a few cells.
-    """
-    count = math.ceil(sphere.radius / scene.spacing)
-    offsets = product([(np.arange(-count, count) + 0.5) * scene.spacing] * scene.dim)
-    inside = np.linalg.norm(offsets, axis=1) <= sphere.radius * (1 + 1e-9)
-    return np.asarray(sphere.centre) + offsets[inside]
 
 
 def keep_outside(scene: Scene, solids: Sequence[Solid], x: np.ndarray) -> np.ndarray:

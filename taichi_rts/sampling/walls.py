@@ -11,7 +11,8 @@ import numpy as np
 
 from taichi_rts.medium.smoothing import lattice_sum, make_kernel
 from taichi_rts.sampling.lining import line_solid, neighbours, shares
-from taichi_rts.scene.geometry.solid import Solid
+from taichi_rts.scene.fluids.shape import lattice
+from taichi_rts.scene.obstacles.solid import Solid
 from taichi_rts.scene.parts.conditions import AXES
 from taichi_rts.scene.scene import Scene
 
@@ -92,8 +93,8 @@ def line_walls(scene: Scene) -> tuple[WallLayer, np.ndarray]:
             else np.concatenate([scene.domain.lower[d] - depths[::-1], inner[d], scene.domain.upper[d] + depths])
             for d in range(axis + 1, scene.dim)
         ]
-        positions.append(product([*inner[:axis], faces, *beyond]))
-        deep.append(product([*inner[:axis], np.concatenate([depths[::-1], depths]), *beyond])[:, axis])
+        positions.append(lattice([*inner[:axis], faces, *beyond]))
+        deep.append(lattice([*inner[:axis], np.concatenate([depths[::-1], depths]), *beyond])[:, axis])
         share = math.prod(stretch[d] for d in range(scene.dim) if d != axis)
         volumes.append(np.full(len(positions[-1]), volume * share))
         behind = positions[-1][:, axis] < scene.domain.lower[axis]
@@ -224,8 +225,3 @@ def planes_sum(scene: Scene) -> Callable[[float], float]:
     """Return the sum of `plane_sum` over all planes of a wall, as a function of the distance d [m] of the first."""
     plane, s, count = plane_sum(scene), scene.spacing, scene.wall_planes
     return lambda d: sum(plane(d + k * s) for k in range(count))
-
-
-def product(axes: list[np.ndarray]) -> np.ndarray:
-    """All combinations of the axes' values, (N, dim), the last axis fastest."""
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))

@@ -11,10 +11,11 @@ from annotated_types import Len
 from pydantic import Field, StringConstraints
 from pydantic.dataclasses import dataclass
 
+from taichi_rts.scene.fluids.shapes import Fluid
+from taichi_rts.scene.obstacles.shapes import Obstacle
+from taichi_rts.scene.parts.box import Box
 from taichi_rts.scene.parts.conditions import AXES, Axis, GravityChange, Inflow, MovingWall, Outlet
-from taichi_rts.scene.parts.obstacles import Obstacle
 from taichi_rts.scene.parts.probes import Gauge, Probe
-from taichi_rts.scene.parts.shapes import Box, Fluid
 from taichi_rts.scene.parts.sound import SoundSpeed
 from taichi_rts.scene.parts.velocities import LinearField
 from taichi_rts.scene.parts.view import View

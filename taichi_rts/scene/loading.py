@@ -11,7 +11,7 @@ import pydantic
 
 from taichi_rts.errors import SceneError
 from taichi_rts.scene.files.reading import SUFFIXES, read_scene_file
-from taichi_rts.scene.parts.particles import Particles
+from taichi_rts.scene.fluids.particles import Particles
 from taichi_rts.scene.scene import Scene
 from taichi_rts.scene.schema import keys_at, schema_of
 from taichi_rts.scene.validation import describe

@@ -1,4 +1,7 @@
-"""Where a run's coordinates begin: single precision tells places near 0 apart, so the device counts from near its domain."""
+"""Where a run's coordinates begin: single precision tells places near 0 apart, so the device counts from near its domain.
+
+Each part of a scene names those of its fields that are coordinates in `places`.
+"""
 
 from __future__ import annotations
 
@@ -8,37 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from taichi_rts.scene.parts.conditions import Inflow, Outlet
-from taichi_rts.scene.parts.obstacles import (
-    BoxObstacle,
-    ConstantMotion,
-    CylinderObstacle,
-    Keyframes,
-    MeshObstacle,
-    PolygonObstacle,
-    SphereObstacle,
-)
-from taichi_rts.scene.parts.particles import Particles
-from taichi_rts.scene.parts.probes import Gauge, Probe
-from taichi_rts.scene.parts.shapes import Block, Box, Sphere
-from taichi_rts.scene.parts.velocities import Field, LinearField, StandingWave, TaylorGreen
-from taichi_rts.scene.parts.view import View
+from taichi_rts.scene.fluids.particles import Particles
+from taichi_rts.scene.parts.velocities import Field
 from taichi_rts.scene.scene import Scene
 from taichi_rts.scene.validation import Vector
-
-CORNERS = ("lower", "upper")
-PLACES: dict[type, tuple[str, ...]] = {
-    **dict.fromkeys((Box, Block, BoxObstacle, Inflow, Outlet), CORNERS),
-    **dict.fromkeys((Sphere, SphereObstacle), ("centre",)),
-    **dict.fromkeys((Probe, Gauge), ("position",)),
-    **dict.fromkeys((ConstantMotion, Keyframes), ("pivot",)),
-    **dict.fromkeys((LinearField, TaylorGreen, StandingWave), ("origin",)),
-    CylinderObstacle: ("start", "end"),
-    PolygonObstacle: ("points",),
-    MeshObstacle: ("translation",),
-    View: ("eye", "target"),
-}
-"""Fields of each part of a scene that are coordinates: one, several, or None for a default."""
 
 
 def origin_of(scene: Scene) -> Vector:
@@ -77,7 +53,7 @@ def translated(thing: Any, shift: Vector) -> Any:
     moved = copy.copy(thing)
     for field in dataclasses.fields(thing):
         value = getattr(thing, field.name)
-        if field.name not in PLACES.get(type(thing), ()):
+        if field.name not in getattr(thing, "places", ()):
             value = translated(value, shift)
         elif value is not None or isinstance(thing, Field):  # the default of a field's origin is 0
             value = _moved(value or (0.0,) * len(shift), shift)

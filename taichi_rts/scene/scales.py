@@ -6,8 +6,6 @@ import math
 
 from taichi_rts.scene.fields import SceneFields
 from taichi_rts.scene.geometry.bodies import bodies
-from taichi_rts.scene.parts.particles import Particles
-from taichi_rts.scene.parts.shapes import top_speed
 from taichi_rts.scene.parts.sound import FLOOR, RegionalSound
 
 LARGEST_RATIO = 32.0  # of sound speeds in one scene
@@ -60,10 +58,7 @@ class SceneScales(SceneFields):
     @property
     def volume(self) -> float:
         """Volume [m^3] (area [m^2] in two dimensions) of all fluid at the start."""
-        return sum(
-            fluid.count * self.spacing**self.dim if isinstance(fluid, Particles) else fluid.volume
-            for fluid in self.fluids
-        )
+        return sum(fluid.volume_at(self.spacing) for fluid in self.fluids)
 
     @property
     def regional_sound(self) -> RegionalSound | None:
@@ -141,7 +136,7 @@ class SceneScales(SceneFields):
         of the domain; along a periodic axis it falls once around. A body force is left out.
         """
         uphill = tuple(-a for a in self.acceleration)
-        starts = [(top_speed(fluid), fluid.reach(uphill)) for fluid in self.fluids]
+        starts = [(fluid.top_speed, fluid.reach(uphill)) for fluid in self.fluids]
         starts += [(math.hypot(*inflow.velocity), inflow.reach(uphill)) for inflow in self.inflows]
         falls = [(speed, max(height - self.floor_potential, 0.0)) for speed, height in starts]
         top = max(speed for speed, _ in falls)

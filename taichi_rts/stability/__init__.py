@@ -1,1 +1,1 @@
-"""Where the solver holds and where it breaks: what a run must keep to, hard cases, and the largest stable step of each."""
+"""Stability: the criteria of survival, hard cases, and the largest stable step of each stepper."""

@@ -1,4 +1,4 @@
-"""Hard cases: small scenes, each with one thing that breaks solvers, and the shortest end that shows it.
+"""Hard cases: small scenes, each with one difficulty for solvers, that end as soon as it is over.
 
 Most share a tank, a spacing and a sound speed, so that speeds can be read as Mach numbers. To add one, write a function that
 returns a scene and list it in `CASES`.
@@ -137,7 +137,7 @@ def viscous_blob() -> Scene:
 
 
 def piston() -> Scene:
-    """A wall that starts to move at once, at Mach 0.1, and stops as suddenly."""
+    """A wall that suddenly starts to move, at Mach 0.1, and stops as suddenly."""
     start, stop, way = 0.02, 0.095, 0.3
     wall = rts.MovingWall(face="x-", times=(0.0, start, stop), displacements=(0.0, 0.0, way))
     return tank(1.2, 1, rts.Block((0, 0), (1.2, 0.4)), moving_walls=(wall,), end_time=0.2)
@@ -160,7 +160,7 @@ def dam(spacing: float, origin: tuple[float, float] = (0, 0), hurry: float = 1.0
 
 MACHS = (0.3, 0.5, 0.7)
 GENTLE = (0.2, 0.26, 0.3)
-"""Where blocks still step long when they meet, so that the impact has to be noticed in time."""
+"""Cases in which blocks still take long steps when they meet, so that the impact has to be noticed in time."""
 CASES: tuple[Case, ...] = (
     *(Case(f"pool_impact_{m}", f"block on a pool at Mach {m}", partial(impact_on_pool, m), shocks=True) for m in MACHS),
     Case(

@@ -1,1 +1,1 @@
-"""Runs that are tried out: until they blow up, again and again, in other processes."""
+"""Trial runs: to the largest stable step, repeated, in other processes."""

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_rts.scene.parts.shapes import Box, top_speed
+from taichi_rts.scene.parts.box import Box
 from taichi_rts.scene.scene import Scene
 
 STRONGEST_JUMP = 16.0  # density over rest up to which a jump is looked for: Mach 5,000
@@ -66,7 +66,7 @@ def impact_speed(scene: Scene) -> float:
     sqrt(|v|^2 + 2 g h) with h the height of a fluid's top above the depth that all fluid would settle to, so still pools have
     none; after a change of gravity fluid falls from the far side of the domain. The speed of moving walls and of inflow counts.
     """
-    falls = [_fall(scene, fluid) + top_speed(fluid) ** 2 for fluid in scene.fluids]
+    falls = [_fall(scene, fluid) + fluid.top_speed**2 for fluid in scene.fluids]
     inflows = [float(np.dot(each.velocity, each.velocity)) for each in scene.inflows]
     return math.sqrt(max(falls + inflows) + 2.0 * _body_force_potential(scene)) + wall_speed(scene)
 

@@ -48,7 +48,7 @@ def processes(workers: int = 1) -> Iterator[ProcessPoolExecutor]:
     try:
         yield pool
     except BaseException:
-        for process in list((pool._processes or {}).values()):  # what runs there would take minutes to end by itself
+        for process in list((pool._processes or {}).values()):  # a task would take minutes to end by itself
             process.terminate()
         pool.shutdown(wait=False, cancel_futures=True)
         raise
@@ -69,7 +69,7 @@ def require_dask() -> None:
 def dask(address: str, workers: int = 1) -> Iterator[Any]:
     """Connect to the Dask scheduler at `address`, or start a `local` cluster of `workers` processes with one task each.
 
-    Raises `Error` if the package is missing or nobody answers.
+    Raises `Error` if the package is missing or no scheduler answers.
     """
     require_dask()
     from distributed import Client, LocalCluster

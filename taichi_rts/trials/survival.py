@@ -174,7 +174,7 @@ def sample_times(sim: Simulation, end: float, samples: int) -> list[float]:
     """Times [s] at which to look: `samples` equal ones, each moved back to the last end of a base step, and `end` itself.
 
     Between two evaluations a reader sees predicted velocities but densities of the last evaluation, and so where fluid bounces
-    an energy that nobody has: +7 % for a block at Mach 0.7 on a pool that gains nothing.
+    an energy that does not exist: +7 % for a block at Mach 0.7 on a pool, although none is gained.
     """
     step = sim.base_step
     times = {math.floor(end * k / samples / step * (1.0 + 1e-12)) * step for k in range(samples + 1)}
@@ -257,7 +257,7 @@ class _Watcher:
 def lost_particles(sim: Simulation, x: np.ndarray, expected: int) -> str:
     """Say how many particles are missing, outside the domain, or behind a wall that moved; empty if none.
 
-    `x` are positions [m], (N, dim). Faces of periodic axes lose nobody. More particles than `expected` come from inflows; those
+    `x` are positions [m], (N, dim). Faces of periodic axes lose none. More particles than `expected` come from inflows; those
     that outlets have taken out are not missed.
     """
     expected -= sim.removed_count

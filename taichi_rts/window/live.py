@@ -92,7 +92,7 @@ class Panel:
         return min(0.97, width / self.size[0]), min(0.97, height / self.size[1])
 
     def __call__(self, gui: Any) -> None:
-        """Draw it, and take over what the sliders have."""
+        """Draw it, and take over the sliders' values."""
         session = self.session
         with gui.sub_window("run", 0.01, 0.01, self.width, self.height) as panel:
             for line in self.lines:

@@ -35,7 +35,7 @@ CLIP_STEP = 0.05  # of the domain's length, by which one key press moves the cli
 
 @dataclasses.dataclass(frozen=True)
 class Settings:
-    """What the sliders choose: they count once `LiveSession.apply` is called, for then kernels are compiled."""
+    """The sliders' values: they take effect when `LiveSession.apply` is called, because kernels are compiled then."""
 
     stepper: str
     levels: int

@@ -1,4 +1,4 @@
-"""Keys that GGUI does not tell of: of a window's keyboard it reports letters and named keys, no digits and no signs."""
+"""Keys that GGUI does not report: it knows letters and named keys, but neither digits nor signs."""
 
 from __future__ import annotations
 

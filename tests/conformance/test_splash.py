@@ -5,7 +5,7 @@ What is asserted, and what was measured in f64 (largest at any sample, time unti
                                      one c   adaptive   regional   asynchronous
     local Mach number                0.142   0.100      0.100      0.100
     energy over the start's          0.997   0.997      0.997      0.997
-    momentum nobody accounts for     5e-15   3e-15      0.0020     0.0028      of the block's
+    momentum not accounted for       5e-15   3e-15      0.0020     0.0028      of the block's
     centre of mass, over the depth   -       0.0065     0.0065     0.0076      beside that with one c
     updates                          348608  549952     192966     209961
 """
@@ -72,7 +72,7 @@ def run(start_taichi, quick, stepper):
         return Run(SCENE, STEPPERS[stepper])
 
 
-def test_nobody_is_lost_and_nothing_runs_away(run):
+def test_no_particle_is_lost_and_nothing_runs_away(run):
     assert run.finite
     assert run.lost == {""}
     counted = run.statistics["particle_updates"] / (run.statistics["base_steps"] * run.statistics["active_fraction"])

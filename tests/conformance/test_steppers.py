@@ -112,7 +112,7 @@ def test_time_never_goes_back(runs, name):
     ends = np.array([sum(ends) for ends in runs[name].ends])
     assert (np.diff(updated, axis=0) >= 0).all()
     assert (ends >= updated).all()
-    assert updated[-1].min() > 0  # everybody has come along
+    assert updated[-1].min() > 0  # all have come along
 
 
 @every_problem
@@ -145,7 +145,7 @@ def test_neighbouring_blocks_obey_the_limiter(runs, stepper, name):
             near = around(block, found)
             if graded:
                 assert all(slowest[block] <= fastest[other] + 1 for other in near)
-            # R_min: a level is that of some block nearby, around which nobody is slower
+            # R_min: a level is that of some block nearby, around which none is slower
             missed += not any(all(slowest[k] <= slowest[block] + graded for k in around(b, found)) for b in near)
         assert missed <= 0.05 * len(found)
 

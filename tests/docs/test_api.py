@@ -82,7 +82,8 @@ def test_the_reference_is_made(tmp_path):
     result = subprocess.run([sys.executable, API, tmp_path], capture_output=True, text=True, timeout=120)
     assert (result.returncode, result.stderr) == (0, "")
     page = (tmp_path / "taichi_rts.html").read_text()
-    assert [name for name in rts.__all__ if f'id="{name}"' not in page] == []
+    ours = [name for name in rts.__all__ if not inspect.ismodule(getattr(rts, name))]  # `ti` has pages of its own
+    assert [name for name in ours if f'id="{name}"' not in page] == []
     assert 'id="Uniform.courant"' in page
     text = re.sub("<[^>]+>", "", re.sub(r'<div class="pdoc-code.*?</pre></div>', "", page, flags=re.DOTALL))
     assert not re.search("0x[0-9a-f]{9}|AfterValidator", text)

@@ -114,6 +114,8 @@ def test_the_data_walk_enters_no_file_twice():
     ]
     assert len(entered) > 25
     assert len(entered) == len(set(entered))
+    named = [file for file in re.findall(r"`([\w/]+/\w*(?:\.py)?)`", walk) if "/" in file]
+    assert [file for file in named if not (ROOT / "taichi_rts" / file.removeprefix("taichi_rts/")).exists()] == []
 
 
 @pytest.mark.parametrize("page", ALL)

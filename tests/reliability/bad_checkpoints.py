@@ -83,16 +83,16 @@ ROWS: list[tuple[str, Change]] = [
     ("particles from a file elsewhere", at(*RUN, "scene", "fluids", value=[{"file": "/etc/passwd"}])),
     ("a field less", at(*RUN, "fields", 0, value="nothing")),
     ("values of no part", at(*RUN, "values", value={"nothing": {}})),
-    ("the clock is text", at(*RUN, "values", "timeline", "now", value="noon")),
-    ("the clock is NaN", at(*RUN, "values", "timeline", "now", value=math.nan)),
+    ("the clock is text", at(*RUN, "values", "solver.timeline", "now", value="noon")),
+    ("the clock is NaN", at(*RUN, "values", "solver.timeline", "now", value=math.nan)),
     ("frames are text", at("extra", "frames", value="many")),
     ("energies are text", at("extra", "initial_energy", value="many")),
     ("an option that there is not", at("extra", "command", value={"nonsense": 1})),
     ("a command that is a number", at("extra", "command", value=7)),
-    ("positions of 1e6 particles", array("0/particles.x", lambda x: np.zeros((1_000_000, 2), x.dtype))),
-    ("positions of one dimension", array("0/particles.x", lambda x: x[:, :1])),
-    ("positions of integers", array("0/particles.x", lambda x: x.astype(np.int64))),
-    ("a missing array", lambda _header, arrays: arrays.__delitem__("0/particles.v")),
+    ("positions of 1e6 particles", array("0/solver.particles.x", lambda x: np.zeros((1_000_000, 2), x.dtype))),
+    ("positions of one dimension", array("0/solver.particles.x", lambda x: x[:, :1])),
+    ("positions of integers", array("0/solver.particles.x", lambda x: x.astype(np.int64))),
+    ("a missing array", lambda _header, arrays: arrays.__delitem__("0/solver.particles.v")),
 ]
 
 
@@ -102,7 +102,7 @@ def lie(source: Path, target: Path) -> None:
     header, arrays = read(source)
     write_archive(target, header, arrays)
     data = bytearray(target.read_bytes())
-    place = data.index(b"0/particles.x.npy")
+    place = data.index(b"0/solver.particles.x.npy")
     start = data.index(b"'shape': (", place) + len(b"'shape': ")
     end = data.index(b"}", start)
     data[start:end] = f"{text}, ".ljust(end - start)[: end - start].encode()

@@ -69,7 +69,7 @@ COMMANDS = [
     ),
     command(
         "more particles than memory",
-        options("--particles", "500M"),
+        options("--particles", "500M", "--precision", "f64"),
         "of memory",
         "are free",
         "use a spacing of at least",

@@ -124,6 +124,6 @@ def test_debug_runs_stop_at_what_must_not_happen(taichi_cpu_f64):
     sim.particles.level.from_numpy(level)  # as if half of the steps had ended long ago
     with pytest.raises(AssertionError, match="particles extrapolated near tick"):
         sim.step()
-    sim.schedule.target = -1  # as if nobody were to step up to here
+    sim.schedule.target = -1  # as if no particle were to step up to here
     with pytest.raises(AssertionError, match="no cell may step at tick"):
         sim.step()

@@ -50,7 +50,7 @@ def test_about_half_of_the_particles_are_active_and_all_levels_appear(corrected)
     assert min(corrected["level_fractions"]) > 0
 
 
-def test_nobody_had_to_be_stopped_by_the_domain(corrected):
+def test_no_centre_had_to_be_stopped_by_the_domain(corrected):
     assert corrected["stopped_by_domain"] == 0
 
 

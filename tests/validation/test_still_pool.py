@@ -33,7 +33,7 @@ def test_it_comes_to_rest(pools, stepper):
 
 
 @pytest.mark.parametrize("stepper", ["regional", *LONG])
-def test_depth_stays_and_nobody_is_lost(pools, stepper):
+def test_depth_stays_and_no_particle_is_lost(pools, stepper):
     x, stopped = pools[stepper][0], pools[stepper][-1]
     assert len(x) == 500
     assert np.isfinite(x).all()

@@ -10,11 +10,12 @@ import numpy as np
 from taichi_rts.scene.checks.obstacles import obstacle_faults
 from taichi_rts.scene.checks.ranges import range_faults
 from taichi_rts.scene.checks.size import size_faults
+from taichi_rts.scene.fluids.particles import LEAST_DISTANCE, Particles
+from taichi_rts.scene.fluids.shape import FluidShape
+from taichi_rts.scene.fluids.shapes import separation
 from taichi_rts.scene.near_pairs import mean_occupancy, nearest_pair
 from taichi_rts.scene.parts.conditions import AXES, face_axis, face_position
-from taichi_rts.scene.parts.particles import LEAST_DISTANCE, Particles
 from taichi_rts.scene.parts.probes import names
-from taichi_rts.scene.parts.shapes import Block, Sphere, separation
 from taichi_rts.scene.scales import SceneScales
 
 MOST_CROWDED = 2.0
@@ -243,7 +244,7 @@ def _particle_faults(scene: SceneScales) -> list[str]:
     return faults
 
 
-def _fluid_faults(scene: SceneScales, k: int, fluid: Block | Sphere | Particles) -> list[str]:
+def _fluid_faults(scene: SceneScales, k: int, fluid: FluidShape) -> list[str]:
     faults = []
     slack = SINGLE * max(scene.domain.size) if isinstance(fluid, Particles) else _slack(scene)
     low = all(a >= b - slack for a, b in zip(fluid.lower, scene.domain.lower, strict=True))
@@ -253,12 +254,9 @@ def _fluid_faults(scene: SceneScales, k: int, fluid: Block | Sphere | Particles)
             f"fluids.{k}: {fluid.outline} leaves the domain from "
             f"{scene.domain.lower} to {scene.domain.upper}; move or shrink it, or enlarge the domain"
         )
-    if isinstance(fluid, Particles):
+    if fluid.extent is None:
         return faults
-    if isinstance(fluid, Sphere):
-        name, least = "radius", fluid.radius
-    else:
-        name, least = "shortest edge", min(b - a for a, b in zip(fluid.lower, fluid.upper, strict=True))
+    name, least = fluid.extent
     if least < scene.spacing * (1 - 1e-6):
         faults.append(f"spacing: {scene.spacing} exceeds the {name} {least:g} of fluids.{k}; use at most {least:g}")
     return faults
@@ -271,8 +269,8 @@ def _pair_faults(scene: SceneScales, k: int, other: int) -> list[str]:
     if gap < -slack:
         return [f"fluids.{k}: overlaps fluids.{other}; move one of them"]
     # A sphere's particles may lie on its surface, a block's stay half a spacing inside: only two spheres' can coincide.
-    both_round = not isinstance(one, Block) and not isinstance(two, Block)
-    if both_round and gap < 0.5 * scene.spacing - slack:
+    may_coincide = not one.keeps_inside and not two.keeps_inside
+    if may_coincide and gap < 0.5 * scene.spacing - slack:
         return [
             f"fluids.{k}: lies {max(gap, 0.0):g} from fluids.{other}, nearer than half a spacing {0.5 * scene.spacing:g}, "
             "so that particles could coincide; move one of them or use a smaller spacing"

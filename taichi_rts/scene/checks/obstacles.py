@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from taichi_rts.errors import SceneError
 from taichi_rts.scene.geometry.drowned import is_drowned
-from taichi_rts.scene.geometry.making import make_solid
-from taichi_rts.scene.geometry.solid import Solid
+from taichi_rts.scene.obstacles.making import make_solid
+from taichi_rts.scene.obstacles.shape import ObstacleShape
+from taichi_rts.scene.obstacles.solid import Solid
 from taichi_rts.scene.scales import SceneScales
 
 FAR_LARGER = 20.0
@@ -34,7 +33,7 @@ def obstacle_faults(scene: SceneScales) -> list[str]:
     return faults or _drowned_faults(scene, solids)
 
 
-def _dimension_faults(scene: SceneScales, obstacle: Any) -> list[str]:
+def _dimension_faults(scene: SceneScales, obstacle: ObstacleShape) -> list[str]:
     """Find vectors that have not the scene's number of components."""
     dim = scene.dim
     if obstacle.dim != dim:
@@ -52,18 +51,19 @@ def _dimension_faults(scene: SceneScales, obstacle: Any) -> list[str]:
     ]
 
 
-def _place_faults(scene: SceneScales, obstacle: Any, solid: Solid) -> list[str]:
+def _place_faults(scene: SceneScales, obstacle: ObstacleShape, solid: Solid) -> list[str]:
     """Find an obstacle of the wrong size or outside the domain."""
     low, high = np.array(scene.domain.lower), np.array(scene.domain.upper)
     size = float((solid.upper - solid.lower).max())
     where = f"{obstacle.shape} from {_text(solid.lower)} to {_text(solid.upper)}"
-    if obstacle.shape == "mesh" and size > FAR_LARGER * float((high - low).max()):
+    scale = getattr(obstacle, "scale", None)  # of a file, whose unit is not known
+    if scale and size > FAR_LARGER * float((high - low).max()):
         return [
-            f"mesh is {size:g} m across, the domain {(high - low).max():g} m, so its file is in another unit; "
-            f"set scale, 0.001 if it is in mm (now {max(obstacle.scale):g})"
+            f"{obstacle.shape} is {size:g} m across, the domain {(high - low).max():g} m, so its file is in another unit; "
+            f"set scale, 0.001 if it is in mm (now {max(scale):g})"
         ]
     if solid.thickness < scene.spacing * (1 - 1e-6):
-        unit = ", or set scale if its file is in another unit" if obstacle.shape == "mesh" else ""
+        unit = ", or set scale if its file is in another unit" if scale else ""
         return [
             f"{obstacle.shape} is {solid.thickness:g} m thin, the spacing {scene.spacing:g}; "
             f"use a spacing of at most {solid.thickness:g}{unit}"

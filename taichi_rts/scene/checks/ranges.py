@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from taichi_rts.scene.parts.shapes import corners, top_speed
+from taichi_rts.scene.parts.box import corners
 from taichi_rts.scene.scales import SceneScales
 
 MOST_MACH = 2.0
@@ -68,7 +68,7 @@ def range_faults(scene: SceneScales) -> list[str]:
 
 def _certain_speed(scene: SceneScales) -> float:
     """Largest speed [m/s] that the scene sets, or that fluid reaches by falling; on periodic axes friction may stop a fall."""
-    given = [top_speed(fluid) for fluid in scene.fluids] + [math.hypot(*inflow.velocity) for inflow in scene.inflows]
+    given = [fluid.top_speed for fluid in scene.fluids] + [math.hypot(*inflow.velocity) for inflow in scene.inflows]
     return max(scene.wall_speed, *given) if any(scene.is_periodic) else scene.estimate_max_speed()
 
 

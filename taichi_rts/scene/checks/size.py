@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from taichi_rts.device.counts import CELLS_PER_BLOCK
-from taichi_rts.scene.parts.particles import Particles
 from taichi_rts.scene.scales import SceneScales
 
 MOST = 2**31 - 1
@@ -32,8 +31,7 @@ class SceneSize:
 def size_of(scene: SceneScales, spacing: float | None = None) -> SceneSize:
     """Return the size of `scene`, or the one that it would have with another `spacing` [m]."""
     s = scene.spacing if spacing is None else spacing
-    given = sum(fluid.count for fluid in scene.fluids if isinstance(fluid, Particles))
-    volume = sum(fluid.volume for fluid in scene.fluids if not isinstance(fluid, Particles))
+    volume = sum(fluid.volume_at(s) for fluid in scene.fluids)
     faces = []
     for plane in range(scene.wall_planes if scene.walls else 0):
         sides = [length / s + 2.0 * (plane + 1) for length in scene.domain.size]
@@ -43,7 +41,7 @@ def size_of(scene: SceneScales, spacing: float | None = None) -> SceneSize:
             if not periodic
         ]
     return SceneSize(
-        particles=given + volume / s**scene.dim + sum(_flowing_in(scene, inflow, s) for inflow in scene.inflows),
+        particles=volume / s**scene.dim + sum(_flowing_in(scene, inflow, s) for inflow in scene.inflows),
         walls=sum(faces),
         blocks=math.prod(length / (scene.support_ratio * s) + MARGIN for length in scene.domain.size),
     )

@@ -20,11 +20,12 @@ from taichi_rts.particle_files.formats import READ
 from taichi_rts.scene.files import splishsplash_fluids as fluids
 from taichi_rts.scene.files.splishsplash_bodies import Body, motor, obstacle, read_body
 from taichi_rts.scene.files.splishsplash_format import Configuration, FluidModel, Material, SplishsplashFile, turn_of
+from taichi_rts.scene.fluids.block import Block
+from taichi_rts.scene.fluids.particles import Particles
 from taichi_rts.scene.geometry.drowned import is_drowned
-from taichi_rts.scene.geometry.making import make_solid
-from taichi_rts.scene.parts.obstacles import Obstacle
-from taichi_rts.scene.parts.particles import Particles
-from taichi_rts.scene.parts.shapes import Block, Box
+from taichi_rts.scene.obstacles.making import make_solid
+from taichi_rts.scene.obstacles.shapes import Obstacle
+from taichi_rts.scene.parts.box import Box
 from taichi_rts.scene.validation import describe
 
 SOLVERS = ("WCSPH", "PCISPH", "PBF", "IISPH", "DFSPH", "PF", "ICSPH")

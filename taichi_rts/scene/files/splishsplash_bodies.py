@@ -11,8 +11,8 @@ import numpy as np
 
 from taichi_rts.errors import SceneError
 from taichi_rts.scene.files.splishsplash_format import RigidBody, turn_of
-from taichi_rts.scene.geometry.meshes import load_mesh
-from taichi_rts.scene.parts.obstacles import MeshObstacle
+from taichi_rts.scene.obstacles.mesh import MeshObstacle
+from taichi_rts.scene.obstacles.mesh_files import load_mesh
 from taichi_rts.scene.parts.rotations import rotation_matrix
 
 ROUND = 1e-5

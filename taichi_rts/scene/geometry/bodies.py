@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_rts.scene.fields import SceneFields
-from taichi_rts.scene.geometry.making import make_solid
-from taichi_rts.scene.geometry.solid import Solid
-from taichi_rts.scene.parts.obstacles import Pieces
+from taichi_rts.scene.obstacles.making import make_solid
+from taichi_rts.scene.obstacles.motion import Pieces
+from taichi_rts.scene.obstacles.solid import Solid
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_rts.scene.geometry.solid import Solid
-from taichi_rts.scene.parts.particles import Particles
-from taichi_rts.scene.parts.shapes import Block, Sphere
+from taichi_rts.scene.fluids.shape import FluidShape
+from taichi_rts.scene.obstacles.solid import Solid
 
 
-def is_drowned(fluid: Block | Sphere | Particles, solid: Solid, spacing: float) -> bool:
+def is_drowned(fluid: FluidShape, solid: Solid, spacing: float) -> bool:
     """Whether a fluid lies wholly in a solid, or nearer to it than half of `spacing` [m]."""
     if (solid.lower - spacing > fluid.lower).any() or (solid.upper + spacing < fluid.upper).any():
         return False  # some of it lies outside
@@ -20,8 +19,7 @@ def is_drowned(fluid: Block | Sphere | Particles, solid: Solid, spacing: float) 
     found = False
     for x in axes[0]:  # a layer at a time bounds the memory, and most often the first decides
         points = np.stack(np.meshgrid([x], *axes[1:], indexing="ij"), axis=-1).reshape(-1, len(axes))
-        if isinstance(fluid, Sphere):
-            points = points[np.linalg.norm(points - np.array(fluid.centre), axis=1) <= fluid.radius]
+        points = points[fluid.contains(points)]
         if (solid.distance(points) >= 0.5 * spacing).any():
             return False
         found = found or len(points) > 0

@@ -10,7 +10,7 @@ from pydantic import model_validator
 from pydantic.dataclasses import dataclass
 
 from taichi_rts.errors import SceneError
-from taichi_rts.scene.parts.shapes import Box, box_reach
+from taichi_rts.scene.parts.box import CORNERS, Box, box_reach
 from taichi_rts.scene.validation import FROZEN, NotNegative, Number, Positive, Vector, validated
 
 AXES = ("x", "y", "z")
@@ -102,6 +102,7 @@ class Inflow:
     velocity: Vector
     start: NotNegative = 0.0
     stop: Positive | None = None
+    places = CORNERS
 
     @model_validator(mode="after")
     def _check(self) -> Inflow:
@@ -150,6 +151,7 @@ class Outlet:
 
     lower: Vector
     upper: Vector
+    places = CORNERS
 
     @model_validator(mode="after")
     def _check(self) -> Outlet:

@@ -22,6 +22,7 @@ class Probe:
 
     position: Vector
     name: Name | None = None
+    places = ("position",)
 
 
 @validated(SceneError)
@@ -34,6 +35,7 @@ class Gauge:
 
     position: Vector
     name: Name | None = None
+    places = ("position",)
 
 
 def names(places: Sequence[Probe | Gauge]) -> list[str]:

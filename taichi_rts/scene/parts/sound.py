@@ -44,7 +44,7 @@ class RegionalSound:
 def _kind(data: Any) -> str:
     """Name the kind of sound speed that `data` looks like, so that a mistake is not reported for the others as well."""
     if isinstance(data, dict | RegionalSound):
-        return "<rule>"
+        return "<RegionalSound>"
     try:
         float(data)
     except (TypeError, ValueError):
@@ -55,7 +55,7 @@ def _kind(data: Any) -> str:
 SoundSpeed = Annotated[
     Annotated[Positive, Tag("<number>")]
     | Annotated[Literal["regional", "auto"], Tag("<word>")]
-    | Annotated[RegionalSound, Tag("<rule>")],
+    | Annotated[RegionalSound, Tag("<RegionalSound>")],
     Discriminator(_kind),
 ]
 """One sound speed [m/s] for all, or what governs a regional one."""

@@ -48,6 +48,7 @@ class LinearField(Field):
     gradient: Annotated[tuple[Vector, ...], Len(2, 3)]
     value: Vector | None = None
     origin: Vector | None = None
+    places = ("origin",)
 
     @model_validator(mode="after")
     def _check(self) -> LinearField:
@@ -123,6 +124,7 @@ class TaylorGreen(Field):
     speed: Positive
     wavelength: Positive
     origin: Plane | None = None
+    places = ("origin",)
 
     @property
     def dim(self) -> int:
@@ -158,6 +160,7 @@ class StandingWave(Field):
     wavelength: Positive
     depth: Positive
     origin: Plane | None = None
+    places = ("origin",)
 
     @property
     def dim(self) -> int:
@@ -188,16 +191,16 @@ def _from(origin: Vector | None, x: np.ndarray) -> np.ndarray:
 def _velocity_tag(data: Any) -> str:
     """Name the kind of velocity by the keys it has, so that a mistake in one is not reported for the others as well."""
     if isinstance(data, LinearField) or (isinstance(data, dict) and not {"speed", "wavelength"} & data.keys()):
-        return "<linear>"
+        return "<LinearField>"
     if isinstance(data, StandingWave) or (isinstance(data, dict) and "depth" in data):
-        return "<wave>"
-    return "<vortices>" if isinstance(data, dict | TaylorGreen) else "<vector>"
+        return "<StandingWave>"
+    return "<TaylorGreen>" if isinstance(data, dict | TaylorGreen) else "<vector>"
 
 
 Velocity = Annotated[
     Annotated[Vector, Tag("<vector>")]
-    | Annotated[LinearField, Tag("<linear>")]
-    | Annotated[TaylorGreen, Tag("<vortices>")]
-    | Annotated[StandingWave, Tag("<wave>")],
+    | Annotated[LinearField, Tag("<LinearField>")]
+    | Annotated[TaylorGreen, Tag("<TaylorGreen>")]
+    | Annotated[StandingWave, Tag("<StandingWave>")],
     Discriminator(_velocity_tag),
 ]

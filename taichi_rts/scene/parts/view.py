@@ -24,6 +24,7 @@ class View:
     eye: Vector | None = None
     target: Vector | None = None
     zoom: Positive = 1.0
+    places = ("eye", "target")
 
     @model_validator(mode="after")
     def _check(self) -> View:

@@ -18,11 +18,11 @@ class BlockGrid:
     """Sorts the `alive[None]` first of up to `count` particles (all, if `alive` is None) into cells.
 
     `order[k]` is the particle at place k; cell c holds places `start[c] .. start[c+1]`. `occupied` lists the blocks that hold
-    somebody, ascending, `occupied_count[None]` of them.
+    particles, ascending, `occupied_count[None]` of them.
 
     Within a cell particles stand in order of their id, so the result depends on positions alone: not on threads, not on
     history. On a GPU it is a counting sort, with two passes over the particles and two over the cells; on a CPU `Resorting`
-    changes what was there.
+    changes the previous order.
     """
 
     cells_each = CELLS_PER_BLOCK
@@ -67,16 +67,16 @@ class BlockGrid:
         self.tracks_arrivals = self.tracks_vacated = False
 
     def track_arrivals(self) -> None:
-        """From now on note in `arrived`, (blocks,), by a 1 which blocks a particle has come into; who reads it changes it.
+        """From now on note in `arrived`, (blocks,), by a 1 which blocks a particle has come into; readers reset it.
 
-        Now and then, after particles were reordered in memory, `Simulation` has all blocks count. Has to be called before the
+        Now and then, after particles were reordered in memory, all blocks are marked. Has to be called before the
         first sort.
         """
         self.tracks_arrivals = True
         self.arrived = ti.field(ti.i32, self.geometry.blocks)
 
     def track_vacated(self) -> None:
-        """From now on list in `vacated` the `vacated_count[None]` blocks that nobody is in any more since the last update.
+        """From now on list in `vacated` the `vacated_count[None]` blocks that have become empty since the last update.
 
         Has to be called before the first sort.
         """
@@ -86,7 +86,7 @@ class BlockGrid:
             self.vacated_count = ti.field(ti.i32, ())
 
     def forget(self) -> None:
-        """Take note that particles have other entries now: nobody is where its entry was, so all count as new in their blocks."""
+        """Take note that particles have other entries now: none is where its entry was, so all count as new in their blocks."""
         self.cell_of.fill(-1)
         self.start.fill(0)
         self.restored()
@@ -181,7 +181,7 @@ class BlockGrid:
 
     @ti.func
     def is_empty(self, block):
-        """Whether a block held nobody at the last update."""
+        """Whether a block held no particle at the last update."""
         return self.first(block) == self.first(block + 1)
 
     @ti.func

@@ -110,7 +110,7 @@ class NeighbourSum:
     def visit_run(self, finish: ti.template(), due: ti.template(), now, tick, thread, m, end):
         """Visit the due particles of occupied block number `m` and of those behind it as far as a window reaches.
 
-        Return who comes next.
+        Return the number of the next occupied block.
         """
         block = self.grid.occupied[m]
         row, column = block // self.grid.geometry.shape[0], block % self.grid.geometry.shape[0]
@@ -145,7 +145,7 @@ class NeighbourSum:
 
     @ti.func
     def open(self, due: ti.template(), thread, row, column, m, most):
-        """Gather who lies around the run of at most `most` blocks in which somebody is due, from `column` of `row` on.
+        """Gather the particles around the run of at most `most` blocks that hold due particles, from `column` of `row` on.
 
         The first is occupied block number `m`.
 

@@ -29,13 +29,13 @@ def integers(count: float, blocks: float) -> float:
 class Resorting:
     """What a counting sort gives, from what the last one gave: most particles stay in their cell from step to step.
 
-    The blocks are shared out among `parts` of equal numbers of them. A part that nobody has left or come into keeps its order;
-    if others before it have grown or shrunk, it moves as a whole. In the other parts the cells are read in turn: who has left is
-    left out, who has come is put in by its id. So the work is one comparison for each particle, in vector instructions, and a
-    little for each part; the rest goes with those that changed.
+    The blocks are divided into `parts` of equally many. A part that no particle has left or come into keeps its order;
+    if others before it have grown or shrunk, it moves as a whole. In the other parts the cells are read in turn: particles that
+    have left are left out, those that have come are put in by their id. So the work is one comparison for each particle, in
+    vector instructions, and a little for each part; the rest is in proportion to the number of particles that changed.
 
-    While particles are inserted, `BlockGrid.cell_count` holds for each cell two things: the flag `LEFT`, if somebody has left it,
-    and the first entry + 1 in the list of those that have come, of which `following` is the next. Between updates it is 0.
+    While particles are inserted, `BlockGrid.cell_count` holds for each cell two things: the flag `LEFT`, if a particle has left
+    it, and the first entry + 1 in the list of those that have come, of which `following` is the next. Between updates it is 0.
     """
 
     LEFT = 1 << 30
@@ -52,7 +52,7 @@ class Resorting:
         self.all_anew = ti.field(ti.i32, ())
         self.touched = ti.field(ti.i32, self.parts)
         self.growth = ti.field(ti.i32, self.parts)
-        """How many have come into each part, less those who have left it."""
+        """How many particles have come into each part, minus those that have left it."""
         self.old_first = ti.field(ti.i32, self.parts + 1)
         self.new_first = ti.field(ti.i32, self.parts + 1)
         self.occupied_in = ti.field(ti.i32, self.parts)
@@ -60,12 +60,12 @@ class Resorting:
         self.first_occupied = ti.field(ti.i32, self.parts)
 
     def restored(self) -> None:
-        """Take note that the order is one of another time: look at all parts at the next update."""
+        """Take note that the order is that of another time: look at all parts at the next update."""
         self.touched.fill(1)
 
     @ti.func
     def insert_all(self, locate: ti.template(), now, tick):
-        """Tell the grid who has changed its cell, where particle `i` is at `locate(i, now, tick)` [m].
+        """Tell the grid which particles have changed their cell, where particle `i` is at `locate(i, now, tick)` [m].
 
         To be called at the outermost level of a kernel.
         """
@@ -132,7 +132,7 @@ class Resorting:
 
     @ti.func
     def list_arrivals(self):
-        """Link who has come into each cell. Where too many have changed, all are taken for new."""
+        """Link the particles that have come into each cell. If too many have changed, all count as new."""
         grid = self.grid
         self.all_anew[None] = 0
         if self.moved_count[None] <= self.room:
@@ -174,7 +174,7 @@ class Resorting:
 
     @ti.func
     def changed(self, first, end):
-        """Say, one bit each, which of the cells from `first` on and before `end` somebody has left or come into."""
+        """Say, one bit each, which of the cells from `first` on and before `end` a particle has left or come into."""
         bits = 0
         for cell in range(first, ti.min(first + BITS, end)):
             bits |= ti.cast(self.grid.cell_count[cell] != 0, ti.i32) << (cell - first)
@@ -198,7 +198,7 @@ class Resorting:
 
     @ti.func
     def merge(self, part, identity: ti.template()):
-        """Write who is in each cell of a part to `rank`, in order of their ids."""
+        """Write the particles in each cell of a part to `rank`, in order of their ids."""
         grid = self.grid
         first, end = self.cells_of(part)
         n, done, last = self.new_first[part], self.old_first[part], self.old_first[part + 1]
@@ -229,7 +229,7 @@ class Resorting:
 
     @ti.func
     def merge_cell(self, cell, old, old_end, first, identity: ti.template()):
-        """Write who is in a cell to `rank` from `first` on; return the end. It held the entries `old` to `old_end` of `order`."""
+        """Write a cell's particles to `rank` from `first` on; return the end. It held entries `old` to `old_end` of `order`."""
         grid = self.grid
         n, entry = first, grid.cell_count[cell]
         for k in range(old, old_end):

@@ -1,9 +1,9 @@
 """Sums over all neighbours of the due particles: the inner loops of the solver, one way for CPUs and one for GPUs.
 
-On a GPU a thread has a particle and walks over the rows of cells around it. On a CPU a thread has a run of blocks along x. It
-gathers what lies in them and around them into a window: the nine rows of blocks (three in two dimensions) that surround the run,
-column of cells by column of cells, one array for each quantity. What lies near a particle is then one contiguous range, over
-which LLVM makes vector instructions with a single sum at the end (docs/evidence/speed.md has the figures).
+On a GPU a thread handles a particle and goes over the rows of cells around it. On a CPU a thread handles a run of blocks along
+x. It gathers the particles in and around them into a window: the nine rows of blocks (three in two dimensions) around the run,
+column of cells by column of cells, one array for each quantity. The possible neighbours of a particle are then one contiguous
+range, for which LLVM makes vector instructions with a single sum at the end (docs/evidence/speed.md has the figures).
 """
 
 import math
@@ -21,7 +21,7 @@ from taichi_rts.solver.particles.neighbourhood import Neighbourhood
 
 RUN = 16  # most blocks that share a window
 VECTOR = 32
-"""Loops go on to a multiple of it, or LLVM leaves a scalar remainder; who lies there is too far away to count."""
+"""Loops run to a multiple of it, or LLVM leaves a scalar remainder; the padding there is too far away to count."""
 ROOM = 1.5  # of a window, over what lies around a run of blocks at rest
 AT_ONCE = {2: 1, 3: 8}
 """Fluid entries that are copied as one vector, by dimension: mostly all of a cell's, so that no branch is mispredicted.
@@ -34,7 +34,7 @@ INDEX = 0x0FFFFFFF
 
 Where there are more entries than that they are copied one by one.
 """
-FAR = 1e3  # distance over the support radius of those behind the last
+FAR = 1e3  # distance over the support radius of the padding behind the last entry
 
 
 def room(dim: int, per_block: float) -> int:
@@ -78,7 +78,7 @@ class Windows:
         self.far = geometry.upper[0] + FAR * geometry.reach
 
     def copies(self, names: Sequence[str], source: Any, copy: Any) -> list[tuple[ti.Field, ti.Field, float, int]]:
-        """List field, copy, what stands for nobody, and axis (-1 if not a position), of each scalar of `names` of two objects."""
+        """List field, copy, value of the padding, and axis (-1 if not a position), of each scalar of `names` of two objects."""
         found = []
         for name in names:
             one, two = getattr(source, name), getattr(copy, name)
@@ -115,7 +115,7 @@ class Windows:
 
     @ti.func
     def gather(self, copies: ti.template(), row, column, number, begin):
-        """Copy who lies in the blocks at `column` to entry `begin` and on, as the columns `number` and on; return the end."""
+        """Copy the particles of the blocks at `column` to entry `begin` and on, as columns `number` and on; return the end."""
         n = begin
         rows = self.row_count[None]
         for part in range(CELLS_PER_BLOCK):
@@ -143,7 +143,7 @@ class Windows:
     @ti.func
     def copy(self, copies: ti.template(), k, n, row, column, above):
         """Copy `at_once` entries from `k` on, which lie in the block at `column` in row `above` of those around `row`, to `n`."""
-        for field, copy, _nobody, axis in ti.static(copies):
+        for field, copy, _padding, axis in ti.static(copies):
             values = ti.Vector([field[k + lane] for lane in ti.static(range(self.at_once))])
             if ti.static(axis >= 0 and self.geometry.periodic[axis]):
                 middle = self.middle(row, column, above, axis)
@@ -166,11 +166,11 @@ class Windows:
 
     @ti.func
     def close(self, copies: ti.template(), number, end):
-        """Let nobody stand behind the last entry, so that loops may go on there."""
+        """Pad the window behind the last entry, so that loops may run on there."""
         self.column_start[number] = end
-        for _field, copy, nobody, _axis in ti.static(copies):
+        for _field, copy, padding, _axis in ti.static(copies):
             for n in range(end, end + VECTOR):
-                copy[n] = nobody
+                copy[n] = padding
 
     @ti.func
     def near(self, number):

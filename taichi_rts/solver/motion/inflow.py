@@ -50,7 +50,7 @@ class Inflows:
         self.patches = [Patch(scene, number) for number in range(len(scene.inflows))]
         self.done = [0] * len(self.patches)
         self.capacity = sum(patch.layers * len(patch.positions) for patch in self.patches)
-        """How many particles enter until the scene's end."""
+        """Number of particles that enter until the scene's end."""
 
     @property
     def entered(self) -> int:

@@ -24,7 +24,7 @@ They bound the damage once a run has blown up: unlimited, particles pile up in a
 class Motion:
     """Prediction and correction with one integrator. `now` is a tick, `tick` its length [s].
 
-    `read_at[block]` says when a block's particles are read, in ticks after `now`, and is negative where nobody reads them.
+    `read_at[block]` says when a block's particles are read, in ticks after `now`, and is negative where they are not read.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Motion:
         """Position [m] of particle `i`, `dt` [s] after its last evaluation, kept inside the domain.
 
         Within its step that is the prediction; before it (dt < 0) the cubic through the positions and velocities of its
-        last two evaluations (Hermite), so a reader who lives in the past interpolates as well.
+        last two evaluations (Hermite), so that reading at an earlier time interpolates as well.
         """
         p = self.particles
         x = self.integrator.predict_position(p.x[i], p.v[i], p.a[i], dt)
@@ -193,7 +193,7 @@ class Motion:
         x = self.integrator.correct_position(self.near.x[k], a, a_new, dt)
         v = self.integrator.correct_velocity(self.particles.v[i], a, a_new, dt)
         v, a_new = self.limit(v, self.largest_speed), self.limit(a_new, self.largest_acceleration)
-        finite = True  # of what was given too: a position that is not a number has been clamped to a corner by now
+        finite = True  # also of the values given: a position that is NaN has been clamped to a corner by now
         for d in ti.static(range(self.particles.dim)):
             total = self.particles.x[i][d] + v[d] + a_new[d]
             finite = finite and not (ti.math.isnan(total) or ti.math.isinf(total))

@@ -1,4 +1,4 @@
-"""Fluid that flows out: what has come into an outlet's box is taken out of the particles' fields."""
+"""Fluid that flows out: particles in an outlet's box are removed from the particles' fields."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from taichi_rts.medium.energy import potential_of
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.motion.motion import Motion
 
-EVERY = 4  # sorts between two looks, each of which the host waits for: fluid at Mach 0.1 moves 0.16 r meanwhile
+EVERY = 4  # sorts between two checks, each of which the host waits for: fluid at Mach 0.1 moves 0.16 r meanwhile
 
 
 @ti.data_oriented

@@ -2,7 +2,7 @@
 
 A particle's state is anchored at its own last force evaluation: position, velocity and acceleration at the tick
 `updated`. Between evaluations it moves with that constant acceleration, which composes exactly: its state at any later
-tick follows in one go, and a particle nobody asks for need not be touched.
+tick follows in one go, and a particle that is not read need not be touched.
 """
 
 from collections.abc import Set
@@ -103,7 +103,7 @@ class Particles:
 
     @ti.kernel
     def load(self, x: Rows, v: Rows, rho: Values, rest_density: float):
-        """Begin with these, at rest density where nobody is yet; one kernel compiles quicker than many assignments."""
+        """Begin with these, at rest density where no particle is yet; one kernel compiles quicker than many assignments."""
         for k in self.identity:
             self.identity[k] = k
             self.rho[k] = rest_density

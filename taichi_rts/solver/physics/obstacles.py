@@ -7,7 +7,7 @@ import numpy as np
 from taichi_rts.device.backend import Backend, ti
 from taichi_rts.sampling.walls import WallLayer
 from taichi_rts.scene.geometry.bodies import Body
-from taichi_rts.scene.geometry.solid import DistanceGrid
+from taichi_rts.scene.obstacles.solid import DistanceGrid
 from taichi_rts.solver.grid.geometry import Geometry
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood

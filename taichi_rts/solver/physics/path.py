@@ -11,7 +11,7 @@ from taichi_rts.solver.physics.timetable import Timetable, Wheel, store
 
 @ti.data_oriented
 class Path:
-    """Where a moving body is, as a function of time alone: a reader at any time may ask, `ahead` [s] after tick `now`."""
+    """Where a moving body is, as a function of time alone: for any time, `ahead` [s] after tick `now`."""
 
     def __init__(self, body: Body) -> None:
         pieces = body.pieces
@@ -34,7 +34,7 @@ class Path:
         self.shift, self.velocity = (ti.Vector.field(dim, float, count) for _ in range(2))
         self.spin = ti.Vector.field(pieces.spins.shape[1], float, count)
         self.axis = ti.Vector.field(pieces.spins.shape[1], float, count)
-        """Direction of the angular velocity; in two dimensions the wheel knows the sign."""
+        """Direction of the angular velocity; in two dimensions `wheel` has the sign."""
         self.turn = ti.Matrix.field(dim, dim, float, count)
         axes = np.ones((count, 1)) if dim == 2 else pieces.spins / np.where(speeds > 0.0, speeds, 1.0)[:, None]
         values = (body.speeds, shifts, pieces.velocities, pieces.spins, axes, pieces.turns)

@@ -11,13 +11,13 @@ import numpy as np
 from taichi_rts.device.backend import ti
 
 LAST = 2**31 - 1
-"""Tick of all moments that no run reaches."""
+"""Tick of all moments beyond the end of any run."""
 SNAP = 1e-6
-"""A moment that is so near to a tick, in ticks, is that tick: rounding must not put it off by a step."""
+"""A moment nearer than this to a tick, in ticks, is that tick: rounding must not delay it by a step."""
 
 
 class Ticking:
-    """What holds numbers that depend on the length of a tick; `Simulation` tells it that length before anything is asked."""
+    """A part whose numbers depend on the length of a tick, which it is given before it is used."""
 
     def count_in(self, tick: float) -> None:
         """Take a `tick` [s]; in double precision, on the host."""

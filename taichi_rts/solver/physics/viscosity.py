@@ -1,4 +1,4 @@
-"""Viscosity terms of the momentum equation; a scene that sets neither compiles neither.
+"""Viscosity terms of the momentum equation; only terms that a scene uses are compiled.
 
 They leave out their common denominator, (rho_i + rho_j) (|x_ij|^2 + 0.01 h^2): see `MomentumEquation`.
 """
@@ -28,9 +28,7 @@ class ArtificialViscosity:
     def fluid_pair(self, near: ti.template(), i, j, x_ij, v_ij, d2):
         """Coefficient of x_ij."""
         approach = v_ij.dot(x_ij)
-        return self.factor * ti.select(
-            approach < 0.0, approach, 0.0
-        )  # quicker than min, which minds what is not a number
+        return self.factor * ti.select(approach < 0.0, approach, 0.0)  # quicker than min, which also handles NaN
 
     @ti.func
     def wall_pair(self, i, b, x_ib, v_ib, d2, wall: ti.template()):

@@ -1,7 +1,7 @@
 """Wall boundary particles after Akinci et al. 2012.
 
-Why this one and not Adami et al. 2012: its wall particles carry a volume and no state. Nothing has to be extrapolated to
-them, so a wall is valid at every time: just what particles that all live at different times need. And its pressure force
+Why this one and not Adami et al. 2012: its wall particles carry a volume and no state. Nothing has to be extrapolated
+to them, so a wall is valid at every time, as particles at different times need. And its pressure force
 derives from the same energy as the fluid's, so a wall at rest does no work.
 
 Akinci's V_b = 1 / sum_k W_bk makes up for what a single layer lacks, seen from the wall. For the even faces of the domain
@@ -22,8 +22,8 @@ from taichi_rts.solver.particles.neighbourhood import Neighbourhood
 
 LARGEST_SHEAR = 4.0
 LARGEST_SHEAR_LAYERED = 6.0
-"""Of several planes the first may lie 2.2 spacings deep (r = 4s), and fluid at rest on the face, half a spacing from
-it must still count as it is."""
+"""Where walls have several planes: the first may lie 2.2 spacings deep (r = 4s), and fluid at rest half a spacing from the face
+must still count as it is."""
 
 
 @ti.data_oriented

@@ -60,9 +60,9 @@ class SoundRule:
         self.wish_ceiling = ti.field(float, self.blocks)
         """The same, with slack."""
         self.own = ti.field(float, self.blocks)
-        """The largest sound speed of its particles, as compressed as they are."""
+        """The largest sound speed of its particles, at their present compression."""
         self.felt = ti.field(float, self.blocks)
-        """What its neighbours notice of it: its wish, and half of its target."""
+        """What its neighbours take into account: its own need, and half of its target."""
         self.target = ti.field(float, self.blocks)
         self.ceiling = ti.field(float, self.blocks)
         self.limit = ti.field(float, self.blocks)
@@ -72,9 +72,9 @@ class SoundRule:
     def update(self, read_at: ti.Field, now: int, tick: float) -> None:
         """Work out the targets and limits of all blocks at tick `now`.
 
-        What is said of neighbours' targets takes a block a call to spread, which no wave overtakes. Only blocks that somebody
-        read in the last step (`read_at` of it is not negative), or that somebody has come into since, are looked at again, and
-        all of them now and then: in the others nobody has stepped. With less (only who has stepped, and never all) a ringing
+        Targets spread by one block per call, faster than any wave. Only blocks that were read in the last step (their
+        `read_at` is not negative), or that a particle has come into since, are worked out again, and all of them now and
+        then: in the others no particle has stepped. With less (only blocks that have stepped, and never all) an oscillating
         pool of 1 m has four to ten times the energy after 20 s.
         """
         self.work_out(read_at, now, tick)
@@ -86,7 +86,7 @@ class SoundRule:
     @ti.kernel
     def work_out(
         self, read_at: ti.template(), now: ti.i32, tick: float
-    ):  # one kernel, for launches cost more than the last loops
+    ):  # one kernel, because launches cost more than the last loops
         ti.loop_config(serialize=self.grid.serial)  # they are few
         for m in range(self.grid.vacated_count[None]):
             self.forget(self.grid.vacated[m])
@@ -120,7 +120,7 @@ class SoundRule:
 
     @ti.func
     def is_stale(self, block, read_at):
-        """Whether what is known of an occupied block may have changed since it was looked at."""
+        """Whether the values of an occupied block may have changed since they were worked out."""
         stale = read_at >= 0 or self.wish[block] == 0.0
         if ti.static(self.grid.tracks_arrivals):
             stale = stale or self.grid.arrived[block] == 1
@@ -178,6 +178,6 @@ class SoundRule:
 
     @ti.func
     def forget(self, block):
-        """A block that holds nobody asks for nothing."""
+        """An empty block requires no sound speed."""
         for field in ti.static((self.wish, self.wish_ceiling, self.felt, self.target, self.ceiling, self.limit)):
             field[block] = 0.0

@@ -1,4 +1,4 @@
-"""What a stepper is: a frozen description that users write, and a schedule that says who is due."""
+"""What a stepper is: a frozen description that users write, and a schedule that says which particles are due."""
 
 from __future__ import annotations
 
@@ -118,13 +118,13 @@ class Stepper:
         raise NotImplementedError
 
     def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
-        """Build the fields and kernels that decide who is due."""
+        """Build the fields and kernels that decide which particles are due."""
         raise NotImplementedError
 
 
 @ti.data_oriented
 class Schedule:
-    """Who is due in the present step.
+    """Which particles are due in the present step.
 
     Attributes:
         due: places (in the grid's order) of the due particles, ascending; `due_count` of them. Those of a block are
@@ -179,7 +179,7 @@ class Schedule:
         return True
 
     def restart(self, now: int) -> None:
-        """Forget steps and levels: at tick `now` everybody is due, as at the start."""
+        """Forget steps and levels: at tick `now` all particles are due, as at the start."""
 
     def next_ticks(self) -> int:
         """Length of the next step in ticks; it depends on the state only."""
@@ -189,7 +189,7 @@ class Schedule:
         """Take note that the grid has been sorted anew."""
 
     def select(self, now: int, tick: float) -> None:
-        """Decide who is due at tick `now` (Algorithm 1, lines 5-16)."""
+        """Decide which particles are due at tick `now` (Algorithm 1, lines 5-16)."""
 
     @ti.func
     def evaluated(self, i, acceleration, tick):

@@ -1,4 +1,4 @@
-"""Cells (blocks of the grid) that each have a time: which of them may step together, and who is due in them.
+"""Cells (blocks of the grid) that each have a time: which of them may step together, and which particles are due.
 
 The rule is proved in `asynchronous.py`; this file finds the cells that obey it.
 """
@@ -32,7 +32,7 @@ class Cells(Schedule):
         self.step = ti.field(ti.i32, blocks)
         """Shortest step [ticks] of each cell's particles."""
         self.ready = ti.field(ti.i32, blocks)
-        self.proposal = self.ready  # nobody asks who was ready once the next steps are proposed
+        self.proposal = self.ready  # `ready` is not read again once the next steps are proposed
         self.claim = ti.field(ti.i32, blocks)
         self.block_due = ti.field(ti.i32, blocks)
         self.due_start = ti.field(ti.i32, blocks + 1)
@@ -85,7 +85,7 @@ class Cells(Schedule):
     def is_due(self, i, time):
         """Whether particle `i` moves with its cell at `time`: whose step is not over yet ends it there, with what has elapsed.
 
-        Left out is only who was evaluated at that time or later: in a cell that was woken.
+        Left out are only particles that were evaluated at that time or later: in a cell that was woken.
         """
         return self.particles.updated[i] < time or self.end(i) == time
 
@@ -105,7 +105,9 @@ class Cells(Schedule):
             ti.atomic_min(self.youngest[None], self.time[self.occupied[m]])
 
     def choose(self, now: int, target: int, cycle_end: int) -> None:
-        """Find the cells that may step before tick `cycle_end`, unless all are past `target`; who is due, and what is read."""
+        """Find the cells that may step before tick `cycle_end`, unless all are past `target`; then the due particles,
+        and what is read.
+        """
         self.find_ready(target, cycle_end)
         self.claim_neighbourhoods()
         self.choose_cells()

@@ -120,7 +120,7 @@ class AsynchronousSchedule(Cells):
         return True
 
     def cycle_length(self, now: int) -> int:
-        """Ticks that the cycle from tick `now` may take: as long as nobody drifts further than the grid allows.
+        """Ticks that the cycle from tick `now` may take: as long as no particle drifts further than the grid allows.
 
         Judged by speeds and accelerations at its start, so an impact within the cycle may exceed it a little; a pair that is
         missed then lies at the very edge of the support radius.
@@ -160,7 +160,7 @@ class AsynchronousSchedule(Cells):
             self.check(now)
 
     def check(self, now: int) -> None:
-        """Debug runs: raise `AssertionError` for a pass in which nobody steps or somebody is extrapolated."""
+        """Debug runs: raise `AssertionError` for a pass in which no particle steps or any is extrapolated."""
         self.count_extrapolated(now)
         assert int(self.stepping[None]) > 0, f"no cell may step at tick {int(self.youngest[None])}"
         assert int(self.extrapolated[None]) == 0, f"particles extrapolated near tick {int(self.youngest[None])}"

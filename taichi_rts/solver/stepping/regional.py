@@ -38,7 +38,8 @@ PRESETS: dict[str | None, dict[str, Any]] = {
         "beta_decay": 0.2,
     },
 }
-"""The paper asks for lambda_f <= 0.25. At 0.25 a double dam break gains 2.2 % of energy, at 0.1 0.1 % (docs/evidence/defaults.md)."""
+"""The paper asks for lambda_f <= 0.25. At 0.25 a double dam break gains 2.2 % of energy, at 0.1 0.1 %
+(docs/evidence/defaults.md)."""
 REGIONAL_SOUND: dict[str, Any] = {
     "courant": 0.4,
     "strict_cfl": False,
@@ -82,16 +83,17 @@ class Regional(Stepper):
         lambda_f: Eq. 2, at most 0.25 in the paper; None: 0.1.
         local_sound: shorten steps to what Eq. 1 allows the sound of water that is compressed by more than 3 % (Tait stiffens
             it: 2.7 c_s at 1.4 rho_0); the base step stays. It moved no limit in the stability map, and disturbs the first
-            steps of pools whose corners start compressed (docs/stability.md).
+            steps of pools whose corners start compressed (docs/evidence/stability.md).
         grading: let the levels of neighbouring blocks differ by at most one (R_min alone leaves jumps from 1 to 3).
         limiter: the neighbour limiter: no block's step exceeds twice a neighbour's, and steps grow by one level at a time, when
-            synchronised. (Waking needs none: line 12 re-evaluates whoever's block has another step.) None: on from three
+            synchronised. (Waking needs none: line 12 re-evaluates particles whose block has another step.) None: on
+            from three
             levels up, off in the paper's preset.
         inactive_density: what due particles read of others: "stale" (of the last evaluation) or "extrapolated".
         steps: levels that blocks may have: "integers", "half_octaves" (1, 2, 3, 4, 6, 8, 12, ...) or "powers_of_two"; None: half
             octaves, but integers in the paper's preset and where n_max is no half octave. Except for integers with one sound
             speed, steps end at multiples of themselves, so that blocks of one level are due together, and base steps in which
-            nobody is due are passed over.
+            no particle is due are passed over.
 
     In a scene with a regional sound speed the base step is lambda_v r over the largest sound speed, level n means that Eq. 1
     holds for n base steps with the block's own, and Eq. 3 is left to the sound speed, which follows the velocity.

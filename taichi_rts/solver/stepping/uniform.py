@@ -75,7 +75,7 @@ class Uniform(Stepper):
         return Timeline(step / SUBDIVISIONS if self.adaptive else step)
 
     def schedule(self, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline) -> Schedule:
-        """Build the schedule under which everybody is always due."""
+        """Build the schedule under which all particles are always due."""
         if self.adaptive:
             return AdaptiveSchedule(self, scene, particles, grid, timeline)
         return UniformSchedule(particles, grid)
@@ -83,7 +83,7 @@ class Uniform(Stepper):
 
 @ti.data_oriented
 class UniformSchedule(Schedule):
-    """Everybody, every step."""
+    """All particles, every step."""
 
     def __init__(self, particles: Particles, grid: BlockGrid) -> None:
         super().__init__(particles, grid)
@@ -106,7 +106,7 @@ class UniformSchedule(Schedule):
 
 @ti.data_oriented
 class AdaptiveSchedule(UniformSchedule):
-    """Everybody, every step; the step follows the largest speed and acceleration. Costs one small read a step."""
+    """All particles, every step; the step follows the largest speed and acceleration. Costs one small read a step."""
 
     def __init__(
         self, stepper: Uniform, scene: Scene, particles: Particles, grid: BlockGrid, timeline: Timeline

@@ -91,7 +91,7 @@ def test_the_verdict_says_yes_and_by_how_much():
     assert runs["paper λ=0.4"]["speedups"]["equal_error_is_bound"]
 
 
-def test_the_verdict_names_who_is_more_accurate_than_any_uniform_run():
+def test_the_verdict_names_what_is_more_accurate_than_any_uniform_run():
     report, runs = judged(make_run("asynchronous", 0.2, 5.0, 1e-4))
     assert runs["asynchronous λ=0.2"]["speedups"]["equal_error"] is None
     assert "asynchronous λ=0.2 reaches 0.0001, which no uniform run here does" in report["verdict"][1]

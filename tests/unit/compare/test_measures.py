@@ -12,6 +12,11 @@ from taichi_rts.scene.near_pairs import mean_neighbours
 SCENE = rts.Scene(domain=rts.Box((0, 0), (2, 2)), fluids=[rts.Block((0, 0), (1, 1))], spacing=0.1)
 
 
+def state(time, x, v, rho, p, energy):
+    """What a trajectory takes of a reading."""
+    return SimpleNamespace(time=time, positions=x, velocities=v, densities=rho, pressures=p, energy=energy)
+
+
 def drifting(speeds, shift=0.0, scale=1.0):
     """A lattice that moves along x, with the speeds given at samples one second apart."""
     x = np.stack(np.meshgrid(np.arange(10), np.arange(10), indexing="ij"), axis=-1).reshape(-1, 2) * 0.1 + 0.05
@@ -20,13 +25,7 @@ def drifting(speeds, shift=0.0, scale=1.0):
         v = np.zeros_like(x)
         v[:, 0] = speed * scale
         moved = x + np.array([0.01 * k + (shift if k else 0.0), 0.0])
-        state = {
-            "positions": moved,
-            "velocities": v,
-            "densities": np.full(len(x), 1000.0),
-            "pressures": np.zeros(len(x)),
-        }
-        run.append(SimpleNamespace(time=k, energy=(speed**2, 2.0 * speed, 0.0), **state))
+        run.append(state(k, moved, v, np.full(len(x), 1000.0), np.zeros(len(x)), (speed**2, 2.0 * speed, 0.0)))
     return run
 
 
@@ -114,7 +113,7 @@ def test_particles_that_only_one_run_has_are_left_out():
 
 def test_a_trajectory_survives_its_file():
     run = drifting([0.0, 1.0])
-    run.append(2.0, np.zeros((3, 2)), np.ones((3, 2)), np.ones(3), np.ones(3), (1.0, 2.0, 3.0))
+    run.append(state(2.0, np.zeros((3, 2)), np.ones((3, 2)), np.ones(3), np.ones(3), (1.0, 2.0, 3.0)))
     read = Trajectory.from_bytes(run.to_bytes())
     assert read.times == run.times
     assert read.energies == run.energies

@@ -7,7 +7,7 @@ from taichi_rts.compare.speedups import at_equal_error, cost_at, fastest_at, lad
 UNIFORM = [(1.0, 1e-1), (10.0, 1e-3), (5.0, 1e-1), (2.0, 5e-1)]  # the last two are beaten by the first
 
 
-def test_the_pareto_front_holds_what_nobody_beats_in_both():
+def test_the_pareto_front_holds_what_no_run_beats_in_both():
     assert pareto_front(UNIFORM) == [0, 1]
     assert pareto_front([(1.0, 1.0), (1.0, 0.5)]) == [1]
     assert pareto_front([]) == []

@@ -68,8 +68,8 @@ def at_frame(monkeypatch, number, act):
     """Have `act(recorder)` called when a frame has just been written."""
     write = Recorder._write_frame
 
-    def wrapped(self, this, video):
-        write(self, this, video)
+    def wrapped(self, frame, this, films):
+        write(self, frame, this, films)
         if this == number:
             act(self)
 

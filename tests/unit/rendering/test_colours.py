@@ -7,11 +7,11 @@ from taichi_rts.rendering.colours import (
     COLORMAPS,
     PALETTES,
     PLAIN,
+    Scale,
     colour_by,
     fluid_colours,
     level_colours,
     scalar_colours,
-    step_range,
 )
 
 
@@ -50,7 +50,7 @@ def test_octaves_share_a_colour_where_levels_double():
     assert np.array_equal(doubling, level_colours([1, 2, 2, 3, 4, 11]))
     lab = cielab(level_colours(2 ** np.arange(11), doubling=True))
     assert (np.linalg.norm(lab[:, None] - lab[None], axis=-1) + 1e9 * np.eye(11)).min() > 14
-    assert np.array_equal(colour_by("level", levels=[3, 4], doubling=True), level_colours([2, 3]))
+    assert np.array_equal(colour_by("level", [3, 4], Scale(doubling=True)), level_colours([2, 3]))
 
 
 def test_lightness_of_the_speed_map_rises_steadily():
@@ -68,20 +68,25 @@ def test_scalar_colours_clip_and_mark_what_is_not_finite():
 
 def test_modes():
     speeds, levels = np.array([0.0, 1.0, 2.0]), np.array([3, 2, 1])
-    assert np.array_equal(colour_by("level", levels=levels), level_colours(levels))
-    assert np.array_equal(colour_by("speed", speeds=speeds), scalar_colours(speeds, 0, 2))
-    assert np.array_equal(colour_by("speed", speeds=speeds, max_speed=4), scalar_colours(speeds, 0, 4))
+    assert np.array_equal(colour_by("level", levels), level_colours(levels))
+    assert np.array_equal(colour_by("level", levels, Scale("paper")), level_colours(levels, "paper"))
+    assert np.array_equal(colour_by("speed", speeds), scalar_colours(speeds, 0, 2))
+    assert np.array_equal(colour_by("speed", speeds, Scale(tops={"speed": 4.0})), scalar_colours(speeds, 0, 4))
     steps = np.array([0.001, 0.002, 0.004])
-    assert np.array_equal(colour_by("step", steps=steps, longest_step=0.008), scalar_colours(steps, 0, 0.008))
-    assert np.array_equal(colour_by("lead", leads=steps, steps=2 * steps), scalar_colours(steps, 0, 0.004))
-    assert step_range(steps, 0.008) == (0, 0.008)
-    assert step_range(steps, None) == (0, 0.004)
-    rest = colour_by("density", densities=np.array([1000.0]), rest_density=1000.0)
-    assert np.allclose(rest, 0xF2 / 255, atol=5e-3)
+    scale = Scale(tops={"step": 0.008, "speed": 0.0}, rest_density=900.0)
+    assert np.array_equal(colour_by("step", steps, scale), scalar_colours(steps, 0, 0.008))
+    assert np.array_equal(colour_by("lead", steps, scale), scalar_colours(steps, 0, 0.004))
+    assert scale.ends("step", steps) == (0, 0.008)
+    assert scale.ends("lead", [0.001, np.nan, np.inf]) == (0, 0.001)
+    assert scale.ends("lead", []) == (0, 1)
+    assert scale.ends("speed") == (0, 1e-12)
+    assert scale.ends("density") == (855, 945)
+    assert np.allclose(colour_by("density", [900.0], scale), 0xF2 / 255, atol=5e-3)
     tints = fluid_colours(["#102030", None])
     assert np.allclose(tints, [[16 / 255, 32 / 255, 48 / 255], level_colours([2])[0]])
-    assert np.array_equal(colour_by("fluid", fluids=np.array([1, 0, 1]), fluid_tints=tints), tints[[1, 0, 1]])
-    plain = colour_by("plain", levels=levels)
+    scale = Scale(fluid_names=("#102030", None))
+    assert np.array_equal(colour_by("fluid", [1, 0, 1], scale), tints[[1, 0, 1]])
+    plain = colour_by("plain", levels)
     assert plain.shape == (3, 3)
     assert np.allclose(plain, PLAIN)
 
@@ -90,12 +95,6 @@ def test_unknown_names_list_the_choices():
     with pytest.raises(
         RenderError, match=r"'vorticity'.*level, step, lead, speed, density, sound, fluid, pressure, plain"
     ):
-        colour_by("vorticity", levels=[1])
+        colour_by("vorticity", [1])
     with pytest.raises(RenderError, match="default, paper"):
         level_colours([1], "nature")
-    with pytest.raises(RenderError, match="needs speeds"):
-        colour_by("speed", levels=[1])
-    with pytest.raises(RenderError, match="needs leads"):
-        colour_by("lead", steps=[1.0])
-    with pytest.raises(RenderError, match="at least one"):
-        colour_by("plain")

@@ -4,34 +4,55 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.readings.levels import level_classes, longest_step, milliseconds
+from taichi_rts.medium.medium import Medium
+from taichi_rts.readings.levels import level_classes, milliseconds
+from taichi_rts.readings.reading import Moment, Reading
 from taichi_rts.rendering import legend
 from taichi_rts.rendering.colours import level_colours, scalar_colours
 from taichi_rts.rendering.painter import Painter, PictureOptions, make_cameras
+from taichi_rts.rendering.tints import Tints
 
 SCENE = rts.load_scene("dam_break_2d")
 NOTHING = SimpleNamespace()  # these tests draw no particles
 
 
-def simulation(stepper, levels, base_step=0.0005):
-    """What a painter asks a simulation for, four particles."""
-    return SimpleNamespace(
-        stepper=stepper,
-        schedule=SimpleNamespace(levels=levels, levels_double=stepper.name == "asynchronous"),
-        base_step=base_step,
-        count=4,
-        time=0.25,
-        steps=lambda: np.array([1, 2, 4, 8]) * base_step,
-        leads=lambda: np.array([0, 1, 2, 9]) * base_step,
+def reading(level, count=1, *, doubling=False, density=None, scene=SCENE, tick=0.0005):
+    """A reading of four particles at rest that have these levels, of `count` in all, at t = 0.25 s."""
+    level, zeros = np.array(level), np.zeros((4, scene.dim))
+    return Reading(
+        moment=Moment(0.25, 500, tick, 500, 4),
+        scene=scene,
+        local=scene,
+        medium=Medium.of(scene, 1.0),
+        stepper=rts.Uniform(),
+        geometry=None,
+        base_ticks=1,
+        level_count=count,
+        levels_double=doubling,
+        ids=np.arange(4),
+        local_positions=zeros + 1.0,
+        velocities=zeros,
+        densities=np.full(4, 1000.0) if density is None else density,
+        accelerations=zeros,
+        base_steps=level,
+        evaluated=np.array([500, 499, 498, 502]),
+        sound_speeds=np.full(4, 20.0),
+        particle_updates=0,
+        inflow=None,
+        outflows=(),
+        runaways=0,
+        not_finite=0,
+        _born=4,
+        _start_fluids=np.zeros(4, int),
     )
 
 
-def entries(sim, level):
-    return Painter(SCENE, PictureOptions(), renderer=NOTHING)._entries(sim, np.array(level))
+def entries(now):
+    return Painter(SCENE, PictureOptions(), renderer=NOTHING)._entries(now)
 
 
 def test_regional_levels_have_an_entry_each():
-    got = entries(simulation(rts.Regional(levels=3), 3), [1, 2, 2, 2])
+    got = entries(reading([1, 2, 2, 2], 3))
     assert [(name, share) for name, _, share in got] == [
         ("level 1: Δt_b", 0.25),
         ("level 2: 2 Δt_b", 0.75),
@@ -41,7 +62,7 @@ def test_regional_levels_have_an_entry_each():
 
 
 def test_asynchronous_levels_have_an_entry_an_octave():
-    got = entries(simulation(rts.Asynchronous(levels=8), 8), [1, 4, 6, 8])
+    got = entries(reading([1, 4, 6, 8], 8, doubling=True))
     assert [(name, share) for name, _, share in got] == [
         ("level 1: Δt_b", 0.25),
         ("level 2: 2 Δt_b", 0.0),
@@ -52,7 +73,7 @@ def test_asynchronous_levels_have_an_entry_an_octave():
 
 
 def test_of_many_levels_only_those_in_use_have_an_entry():
-    got = entries(simulation(rts.Asynchronous(levels=1024), 1024), [1, 3, 1024, 1024])
+    got = entries(reading([1, 3, 1024, 1024], 1024, doubling=True))
     assert [name for name, _, _ in got] == ["level 1: Δt_b", "level 3: 3 Δt_b", "level 1024: 1024 Δt_b"]
     assert np.allclose(got[2][1], level_colours([11])[0])
 
@@ -66,16 +87,16 @@ def test_classes_of_levels_keep_the_whole():
     assert [str(each) for each in classes] == ["1", "2–3", "4–7", "8–15", "16–20"]
 
 
-@pytest.mark.parametrize(("mode", "values", "top"), [("step", [1, 2, 4, 8], 8), ("lead", [0, 1, 2, 9], 16)])
+@pytest.mark.parametrize(("mode", "values", "top"), [("step", [1, 2, 4, 8], 8), ("lead", [0, 0, 1, 9], 16)])
 def test_steps_and_leads_are_coloured_up_to_the_longest_there_can_be(mode, values, top, monkeypatch):
-    sim = simulation(rts.Asynchronous(levels=8), 8)
-    assert longest_step(sim) == pytest.approx(0.004)
+    now = reading([1, 2, 4, 8], 8, doubling=True)
+    assert now.longest_step == pytest.approx(0.004)
     painter = Painter(SCENE, PictureOptions(colour_by=mode), renderer=NOTHING)
-    got = painter.colours(sim, np.zeros((4, 2)), np.full(4, 1000.0), np.array([1, 2, 4, 8]))
+    got = Tints(SCENE).of(now, mode, "default")
     assert np.allclose(got, scalar_colours(values, 0, top))
     bars = []
     monkeypatch.setattr(legend, "draw_colour_bar", lambda image, *bar: bars.append(bar) or image)
-    painter._label(np.zeros((360, 640, 3), np.uint8), sim, np.array([1, 2, 4, 8]))
+    painter._label(np.zeros((360, 640, 3), np.uint8), now)
     title, lower, upper, unit, _ = bars[0]
     assert title == {"step": "step", "lead": "ahead of the youngest"}[mode]
     assert (lower, upper, unit) == (0.0, pytest.approx(0.5 * top), "ms")
@@ -101,11 +122,8 @@ def test_two_views_show_the_same_state_at_one_time_in_a_picture_of_the_asked_siz
     options = PictureOptions(width=1280, height=720, views=("front", "side"))
     canvas = Canvas(*options.view_size)
     painter = Painter(scene, options, renderer=canvas)
-    asked = []
-    sim = simulation(rts.Regional(), 2)
-    sim.local_state = lambda: (
-        asked.append(1) or (np.ones((4, 3)), np.zeros((4, 3)), np.full(4, 1e3), np.array([1, 2, 2, 2]))
-    )
+    asked, now = [], reading([1, 2, 2, 2], 2, scene=scene)
+    sim = SimpleNamespace(read=lambda: asked.append(1) or now)
     panels = []
     draw = legend.draw_legend
     monkeypatch.setattr(legend, "draw_legend", lambda *a, **k: panels.append(a[1:]) or draw(*a, **k))
@@ -136,21 +154,19 @@ def test_views_that_cannot_be_are_refused(scene, options, complaint):
 
 
 def test_text_and_panels_are_three_times_as_large_in_4k():
-    sim, level = simulation(rts.Regional(), 2), np.array([1, 2, 2, 2])
-    sizes = []
+    now, sizes = reading([1, 2, 2, 2], 2), []
     for height in (720, 2160):
         painter = Painter(SCENE, PictureOptions(height=height), renderer=NOTHING)
         blank = np.full((height, height * 16 // 9, 4), (9, 9, 9, 0), np.uint8)
-        rows, columns = np.nonzero(painter._label(blank, sim, level)[..., 3])
+        rows, columns = np.nonzero(painter._label(blank, now)[..., 3])
         sizes.append((np.ptp(rows), np.ptp(columns)))
     assert np.divide(*sizes[::-1]) == pytest.approx(3, rel=0.05)
 
 
 def test_pressure_is_coloured_up_to_that_of_the_largest_speed():
-    sim = simulation(rts.Uniform(), 1)
-    sim.medium = SimpleNamespace(equation_of_state=SimpleNamespace(pressure_numpy=lambda rho: 1e3 * (rho - 1000)))
-    painter = Painter(SCENE, PictureOptions(colour_by="pressure"), renderer=NOTHING)
-    rho = 1000 + 1e-3 * painter.top_pressure * np.array([0, 0.25, 0.5, 2])
-    got = painter.colours(sim, np.zeros((4, 2)), rho, np.ones(4, int))
+    tints = Tints(SCENE)
+    assert tints.top_pressure == pytest.approx(500 * SCENE.estimate_max_speed() ** 2)
+    law = Medium.of(SCENE, 1.0).equation_of_state
+    rho = law.density(tints.top_pressure * np.array([0, 0.25, 0.5, 2]))
+    got = tints.of(reading([1, 1, 1, 1], density=rho), "pressure", "default")
     assert np.allclose(got, scalar_colours([0, 0.25, 0.5, 1], 0, 1), atol=0.01)
-    assert painter.top_pressure == pytest.approx(500 * SCENE.estimate_max_speed() ** 2)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
+from taichi_rts.scene.fluids.shapes import separation
 from taichi_rts.scene.loading import parse_count, scene_from
-from taichi_rts.scene.parts.shapes import separation
 
 UNIT = rts.Box((0, 0), (1, 1))
 DAM = rts.Block((0, 0), (0.5, 0.5))

@@ -100,7 +100,7 @@ def test_fields_are_what_their_formulas_say():
         np.testing.assert_allclose(divergence, 0, atol=1e-8)
 
 
-def test_walls_are_missing_on_periodic_axes_and_behind_inflows_and_know_who_moves():
+def test_walls_are_missing_on_periodic_axes_and_behind_inflows_and_know_which_move():
     layer, owners = line_walls(scene(periodic=("x",)))
     assert set(layer.normals[:, 0]) == {0.0}  # no face across x
     assert len(layer.positions) == 2 * 20

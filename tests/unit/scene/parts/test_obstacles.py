@@ -1,5 +1,6 @@
 """Obstacles before a run: descriptions, faults, geometry, wall particles, fluid left out."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -12,9 +13,9 @@ from taichi_rts.sampling.lining import line_solid
 from taichi_rts.sampling.sampling import sample
 from taichi_rts.sampling.walls import calibrate_walls
 from taichi_rts.scene.geometry.bodies import bodies
-from taichi_rts.scene.geometry.making import make_solid
-from taichi_rts.scene.geometry.solid import distance_grid
 from taichi_rts.scene.loading import scene_from
+from taichi_rts.scene.obstacles.making import MOST_KEPT, make_solid
+from taichi_rts.scene.obstacles.solid import distance_grid
 from taichi_rts.scene.parts.rotations import rotation_matrix
 
 MESHES = Path(__file__).parents[4] / "assets" / "obstacles"
@@ -130,6 +131,22 @@ def test_a_mesh_that_is_not_there_is_refused(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     message = complaint(3, obstacles=[rts.MeshObstacle(BALL, scale=1.23)])
     assert "cannot be read without trimesh; install it: pip install 'taichi_rts[mesh]'" in message
+
+
+def test_a_mesh_is_read_once_for_each_description(tmp_path):
+    pytest.importorskip("trimesh")
+    file = write_wedge(tmp_path / "moving.obj", lambda lines: lines)
+    spin = rts.ConstantMotion(angular_velocity=(0, 0, 2))
+    made = scene(3, obstacles=[rts.MeshObstacle(file, translation=(0.5, 0.5, 0.5), motion=spin)])
+    os.remove(file)
+    solid = make_solid(made.obstacles[0], S)
+    assert make_solid(made.obstacles[0], S, made.domain) is solid  # on which the domain has no influence
+    reach = np.linalg.norm(solid.upper - solid.middle)
+    assert made.wall_speed == pytest.approx(2 * reach, rel=1e-12)
+    for k in range(MOST_KEPT):
+        make_solid(rts.SphereObstacle((k, 0), 1), S)
+    assert make_solid(made.obstacles[0], S) is not solid  # which is no longer kept, but the mesh is
+    assert made.wall_speed == pytest.approx(2 * reach, rel=1e-12)
 
 
 def test_scene_files_hold_obstacles(tmp_path):

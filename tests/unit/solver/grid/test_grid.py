@@ -83,7 +83,7 @@ def sorted_as(cloud_, points, identity):
 @pytest.mark.parametrize(
     ("share", "count"),
     [(0.0, 6000), (0.01, 6000), (0.1, 6000), (0.6, 6000), (0.1, 900)],
-    ids=["nobody", "few", "many", "more than there is room for in the list", "always room for all"],
+    ids=["none", "few", "many", "more than there is room for in the list", "always room for all"],
 )
 def test_particles_that_change_their_cells_are_merged_into_the_others(taichi_cpu_f64, share, count):
     rng = np.random.default_rng(5)

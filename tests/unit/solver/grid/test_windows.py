@@ -213,7 +213,7 @@ def test_tasks_share_out_the_due_not_the_blocks(taichi_cpu_f64, every):
     assert shares[0] == 0
     assert (np.diff(shares) >= 0).all()
     begins = first[shares]
-    assert begins[-1] == due.due_count[None]  # nobody is left out
+    assert begins[-1] == due.due_count[None]  # no due particle is left out
     fair = due.due_count[None] / TASKS + np.diff(first).max()
     assert np.diff(begins).max() <= fair
     by_blocks = due.first.to_numpy()[np.arange(TASKS + 1) * sums.geometry.blocks // TASKS]

@@ -1,4 +1,4 @@
-"""Outlets: who comes in is taken out for good, and what is left is as it was."""
+"""Outlets: particles that come in are removed for good, and the others are as they were."""
 
 import numpy as np
 import pytest
@@ -86,7 +86,7 @@ def test_as_much_flows_out_as_in(simulate, stepper):
     assert removed - early[1] == pytest.approx(entered - early[0], rel=0.03)
     assert sim.statistics["removed_by_outlets"] == [removed]
     x, v = sim.positions(), sim.velocities()
-    assert x[:, 0].max() < 1.0 + 0.05  # nobody lives long in the outlet
+    assert x[:, 0].max() < 1.0 + 0.05  # no particle stays long in the outlet
     np.testing.assert_allclose(v.mean(axis=0), (SPEED, 0), atol=0.05)
     ids = sim.ids()
     assert len(ids) == len(x) == len(sim.steps()) == len(sim.levels()) == sim.count

@@ -1,4 +1,4 @@
-"""Obstacles in runs: nobody gets in, steppers agree, forces and work are right, moving bodies wake what they meet."""
+"""Obstacles in runs: no particle gets in, steppers agree, forces and work are right, moving bodies wake what they meet."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ import taichi_rts as rts
 from taichi_rts.assembly.inventory import parts
 from taichi_rts.device.backend import ti
 from taichi_rts.scene.geometry.bodies import bodies
-from taichi_rts.scene.geometry.making import make_solid
+from taichi_rts.scene.obstacles.making import make_solid
 from taichi_rts.solver.physics.timetable import Ticking
 from taichi_rts.solver.stepping.limits import BlockMaxima
 
@@ -163,7 +163,7 @@ def test_blocks_know_the_speed_of_a_body_before_it_arrives(simulate, unstarted):
 
 
 @pytest.mark.slow
-def test_nobody_gets_into_meshes_or_a_paddle_in_a_dam_break(simulate):
+def test_no_particle_gets_into_meshes_or_a_paddle_in_a_dam_break(simulate):
     trimesh = pytest.importorskip("trimesh")
     scene = rts.load_scene(MESHES / "dam_break_meshes.toml", spacing=0.05)
     paddle = rts.BoxObstacle((0.9, 0.15, 0.2), (1.1, 0.25, 0.4), motion=scene.obstacles[2].motion)
@@ -180,7 +180,7 @@ def test_nobody_gets_into_meshes_or_a_paddle_in_a_dam_break(simulate):
 
 
 @pytest.mark.slow
-def test_nobody_is_in_a_ball_or_a_wedge_after_two_seconds_at_the_scenes_own_spacing(taichi_cpu):
+def test_no_particle_is_in_a_ball_or_a_wedge_after_two_seconds_at_the_scenes_own_spacing(taichi_cpu):
     trimesh = pytest.importorskip("trimesh")
     scene = rts.load_scene(MESHES / "dam_break_meshes.toml")
     scene = scene.replace(obstacles=scene.obstacles[:2])

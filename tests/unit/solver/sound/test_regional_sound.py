@@ -248,7 +248,7 @@ def test_a_block_under_pressure_needs_sound_though_it_is_still(strip):
     assert sim.sound.ceiling.to_numpy()[block] == pytest.approx(SLACK * expected)
     assert sim.sound.own.to_numpy()[block] == pytest.approx(20.0 * (1.05**3 - 0.1))
     assert sim.sound.limit.to_numpy()[block] == pytest.approx(max(expected, 20.0 * (1.05**3 - 0.1)))
-    rho[half] = 900.0  # pulls nobody, and so asks for nothing
+    rho[half] = 900.0  # has no pull on others, and so requires nothing
     p.rho.from_numpy(rho)
     sim.sound.update(sim.schedule.read_at, 0, sim.timeline.tick)
     assert sim.sound.wish.to_numpy()[block] == pytest.approx(FLOOR)

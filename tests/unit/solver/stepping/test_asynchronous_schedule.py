@@ -113,7 +113,7 @@ def test_only_cells_without_a_younger_neighbour_step(recorded):
     assert ended_early > 0 or sim.stepper.steps == "powers_of_two"  # all of a cell move to one new time, newcomers too
 
 
-def test_who_is_read_is_interpolated_to_the_readers_time(recorded):
+def test_particles_that_are_read_are_interpolated_to_the_readers_time(recorded):
     sim, passes = recorded
     past = 0
     for one in passes:
@@ -125,7 +125,7 @@ def test_who_is_read_is_interpolated_to_the_readers_time(recorded):
         near = stepping.copy()
         for stride in sim.grid.geometry.neighbour_strides:
             near |= np.roll(stepping, -stride)
-        assert (read == near[one["block"]]).all()  # nobody else is touched
+        assert (read == near[one["block"]]).all()  # no other block is touched
         assert (time <= ends(old))[read].all()
         dt = ((time - old["updated"]) * tick)[:, None]
         x = old["x"] + old["v"] * dt + 0.5 * old["a"] * dt**2
@@ -219,8 +219,8 @@ def test_neighbours_are_limited_and_woken(recorded):
     assert (woken > 0) == sim.stepper.limiter
 
 
-def test_a_new_cycle_moves_nobody_in_time(recorded):
-    """Whoever crosses into a cell of another time keeps its own; nobody is lost, doubled or evaluated by the sort."""
+def test_a_new_cycle_moves_no_particle_in_time(recorded):
+    """A particle that crosses into a cell of another time keeps its own; none is lost, doubled or evaluated by the sort."""
     sim, passes = recorded
     crossed, mixed = 0, 0
     for last, one in itertools.pairwise(passes):
@@ -239,8 +239,8 @@ def test_a_new_cycle_moves_nobody_in_time(recorded):
     assert mixed > 0 or sim.stepper.steps == "powers_of_two"
 
 
-def test_who_drifts_too_far_ends_the_cycle(recorded):
-    """No pair within the support radius is missed: nobody leaves the place it was sorted in by more than the drift."""
+def test_a_particle_that_drifts_too_far_ends_the_cycle(recorded):
+    """No pair within the support radius is missed: no particle leaves the place it was sorted in by more than the drift."""
     sim, passes = recorded
     geometry = sim.grid.geometry
     assert min(geometry.sides) >= SCENE.support + 2 * geometry.drift

@@ -118,7 +118,7 @@ def test_due_are_the_expired_and_those_whose_step_changed(recorded):
     assert waiting > 0
 
 
-def test_who_is_not_due_keeps_its_state(recorded):
+def test_particles_that_are_not_due_keep_their_state(recorded):
     _, steps = recorded
     for step in steps:
         idle = np.setdiff1d(step["order"], step["order"][step["due"]])
@@ -140,7 +140,7 @@ def test_blocks_without_due_neighbours_are_not_touched_at_all(recorded):
     assert spared > 0
 
 
-def test_who_is_read_was_predicted_to_the_present(recorded):
+def test_particles_that_are_read_were_predicted_to_the_present(recorded):
     sim, steps = recorded
     for step in steps:
         old, order = step["before"], step["order"]

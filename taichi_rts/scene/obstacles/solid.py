@@ -47,8 +47,8 @@ class Solid:
 class DistanceGrid:
     """Signed distances [m] at nodes `origin` + index * `step` [m]; in between they are interpolated linearly.
 
-    They are lowered by what linear interpolation exceeds 0 by on the surface, at sharp edges: whoever is outside by the
-    grid is outside.
+    They are lowered by the largest value that interpolation has on the surface, at sharp edges: the table slightly
+    underestimates distances, so a point that it reports as outside really is outside.
     """
 
     values: np.ndarray
@@ -87,3 +87,9 @@ def distance_grid(solid: Solid, spacing: float) -> DistanceGrid:
     grid = DistanceGrid(np.concatenate(rows).reshape(shape), origin, step)
     excess = max(float(grid.at(solid.surface(0.5 * step)).max()), 0.0)
     return DistanceGrid(grid.values - excess - 1e-3 * spacing, origin, step)
+
+
+def spiral(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Shares of the way, (count,), and angles [rad] of points that cover a disc or a sphere evenly (Vogel 1979)."""
+    k = np.arange(count)
+    return (k + 0.5) / count, np.pi * (3.0 - np.sqrt(5.0)) * k

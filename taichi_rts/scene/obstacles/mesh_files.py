@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import io
 from pathlib import Path
@@ -10,16 +11,21 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.errors import SceneError
-from taichi_rts.scene.geometry.solid import DistanceGrid, Solid, grid_nodes
-from taichi_rts.scene.parts.obstacles import MeshObstacle, changed_mesh
+from taichi_rts.scene.obstacles.mesh import MeshObstacle, changed_mesh
+from taichi_rts.scene.obstacles.solid import DistanceGrid, Solid, grid_nodes
 from taichi_rts.scene.parts.rotations import rotation_matrix
 
 FORMATS = (".obj", ".stl", ".ply")
+MOST_KEPT = 1000  # meshes, as many as a scene may have
 CANDIDATES = 8  # nearest points of the surface whose triangles are asked for the exact distance
 
 
+@functools.lru_cache(maxsize=MOST_KEPT)
 def load_mesh(obstacle: MeshObstacle) -> Any:
-    """Return the `trimesh.Trimesh` of a mesh obstacle where it stands; raises `SceneError`."""
+    """Return the `trimesh.Trimesh` of a mesh obstacle where it stands, not to be changed; raises `SceneError`.
+
+    Its file is read once for each description.
+    """
     path = Path(obstacle.file)
     if path.suffix.lower() not in FORMATS:
         raise SceneError(f"mesh file {obstacle.file!r} is no OBJ, STL or PLY file; convert it to one of {FORMATS}")
@@ -65,7 +71,7 @@ def load_mesh(obstacle: MeshObstacle) -> Any:
 
 
 def mesh_solid(obstacle: MeshObstacle, spacing: float) -> Solid:
-    """Return the geometry of a mesh; its distance is tabulated at once, so that it can be asked often."""
+    """Return the geometry of a mesh; its distance is tabulated when it is first asked for, as it is asked for often."""
     mesh = load_mesh(obstacle)
     lower, upper = np.array(mesh.bounds[0]), np.array(mesh.bounds[1])
     extent = float((upper - lower).min())

@@ -14,7 +14,9 @@ from pydantic.dataclasses import dataclass
 from taichi_rts.errors import SceneError
 from taichi_rts.particle_files.formats import read_particles
 from taichi_rts.particle_files.frame import ParticleFrame
+from taichi_rts.scene.fluids.shape import FluidShape
 from taichi_rts.scene.near_pairs import nearest_pair
+from taichi_rts.scene.parts.box import Box
 from taichi_rts.scene.parts.rotations import Turn, rotation_matrix
 from taichi_rts.scene.validation import Colour, NotNegative, Positive, Vector, validated
 
@@ -38,7 +40,7 @@ Array = Annotated[Any, BeforeValidator(_frozen_array)]
 
 @validated(SceneError)
 @dataclass(frozen=True, eq=False, repr=False, config=ConfigDict(extra="forbid", allow_inf_nan=False))
-class Particles:
+class Particles(FluidShape):
     """Fluid particles given one by one, by arrays or by a `file` (vtu, ply, npz, bgeo, csv) that holds them.
 
     Every particle has the mass that the scene's spacing gives it, so the scene must have the spacing that they were made with.
@@ -65,6 +67,7 @@ class Particles:
     sha256: str | None = None
     kinematic_viscosity: NotNegative | None = None
     colour: Colour | None = None
+    telling = frozenset({"positions", "velocities", "file", "sha256"})
 
     @model_validator(mode="before")
     @classmethod
@@ -174,7 +177,7 @@ class Particles:
 
     @property
     def spacing(self) -> float | None:
-        """Spacing [m] of the scene that the particles are from, None where nobody says."""
+        """Spacing [m] of the scene that the particles are from; None if it is not known."""
         return self._spacing  # type: ignore[attr-defined]
 
     @property
@@ -210,6 +213,27 @@ class Particles:
     def reach(self, direction: Vector) -> float:
         """Largest value of direction.x over the centres [m times the unit of `direction`, (dim,)]."""
         return float((self.positions @ np.asarray(direction)).max())
+
+    @property
+    def extent(self) -> None:
+        """Particles have no extent that a spacing could exceed."""
+        return None
+
+    def volume_at(self, spacing: float) -> float:
+        """Volume of so many cells of `spacing` [m]."""
+        return float(self.count * spacing ** len(self.lower))
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        """All of the bounding box."""
+        return np.ones(len(x), bool)
+
+    def fill(self, spacing: float, domain: Box) -> np.ndarray:
+        """Positions [m], (N, dim), as given, but none beyond the domain, where rounding may have put it."""
+        return np.clip(self.positions, domain.lower, domain.upper)
+
+    def velocities_at(self, x: np.ndarray) -> np.ndarray:
+        """Velocities [m/s], (N, dim), as given."""
+        return np.zeros_like(x) if self.velocities is None else self.velocities
 
     def separation(self, other: Any) -> float:
         """Least distance [m] of a centre from a block or a sphere, negative inside of it; infinite from other particles."""

@@ -1,32 +1,18 @@
-"""Rigid bodies in the fluid as a scene describes them: boxes, spheres, cylinders, polygons, meshes; at rest or moving."""
+"""How an obstacle moves: at constant velocities, or through a table of positions and rotations."""
 
 from __future__ import annotations
 
-import hashlib
 import itertools
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from annotated_types import Len
-from pydantic import BeforeValidator, Discriminator, Tag, model_validator
+from pydantic import Discriminator, Tag, model_validator
 from pydantic.dataclasses import dataclass
 
 from taichi_rts.errors import SceneError
-from taichi_rts.scene.parts.rotations import Turn, number_or_list, rotation_matrix
-from taichi_rts.scene.parts.shapes import Box
-from taichi_rts.scene.validation import FROZEN, NotNegative, Number, Positive, Vector, validated
-
-
-def _as_scale(value: Any) -> Any:
-    if not isinstance(value, (int, float)) or isinstance(value, bool):
-        return value
-    if not value > 0.0:
-        raise ValueError(f"{value} must be above 0")  # once, not for each axis
-    return (value,) * 3
-
-
-Scale = Annotated[tuple[Positive, ...], Len(3, 3), BeforeValidator(_as_scale), number_or_list(3)]
-"""One number, or one for each axis."""
+from taichi_rts.scene.parts.rotations import Turn, rotation_matrix
+from taichi_rts.scene.validation import FROZEN, NotNegative, Positive, Vector, validated
 
 
 class Pieces(NamedTuple):
@@ -66,6 +52,7 @@ class ConstantMotion:
     pivot: Vector | None = None
     start: NotNegative = 0.0
     stop: Positive | None = None
+    places = ("pivot",)
 
     @model_validator(mode="after")
     def _check(self) -> ConstantMotion:
@@ -110,6 +97,7 @@ class Keyframes:
     displacements: tuple[Vector, ...] | None = None
     rotations: tuple[Turn, ...] | None = None
     pivot: Vector | None = None
+    places = ("pivot",)
 
     @model_validator(mode="after")
     def _check(self) -> Keyframes:
@@ -156,183 +144,13 @@ class Keyframes:
 def _motion_tag(data: Any) -> str:
     keys = data.keys() if isinstance(data, dict) else set()
     is_table = isinstance(data, Keyframes) or bool({"times", "displacements", "rotations"} & keys)
-    return "<keyframes>" if is_table else "<constant>"
+    return "<Keyframes>" if is_table else "<ConstantMotion>"
 
 
 Motion = Annotated[
-    Annotated[ConstantMotion, Tag("<constant>")] | Annotated[Keyframes, Tag("<keyframes>")], Discriminator(_motion_tag)
+    Annotated[ConstantMotion, Tag("<ConstantMotion>")] | Annotated[Keyframes, Tag("<Keyframes>")],
+    Discriminator(_motion_tag),
 ]
-
-
-@validated(SceneError)
-@dataclass(frozen=True, config=FROZEN)
-class BoxObstacle:
-    """A box between two corners `lower` and `upper` [m], (dim,), turned by `rotation` [degrees] about its middle.
-
-    `motion` says how it moves, None: not at all; in a scene file its `shape` is "box". Raises `SceneError`.
-    """
-
-    lower: Vector
-    upper: Vector
-    rotation: Turn | None = None
-    motion: Motion | None = None
-    shape: Literal["box"] = "box"
-
-    @model_validator(mode="after")
-    def _check(self) -> BoxObstacle:
-        Box(self.lower, self.upper)
-        return self
-
-    @property
-    def dim(self) -> int:
-        """Number of space dimensions."""
-        return len(self.lower)
-
-
-@validated(SceneError)
-@dataclass(frozen=True, config=FROZEN)
-class SphereObstacle:
-    """A sphere, in two dimensions a disc, around `centre` [m], (dim,), with `radius` [m].
-
-    `motion` says how it moves, None: not at all; in a scene file its `shape` is "sphere". Raises `SceneError`.
-    """
-
-    centre: Vector
-    radius: Positive
-    motion: Motion | None = None
-    shape: Literal["sphere"] = "sphere"
-
-    @property
-    def dim(self) -> int:
-        """Number of space dimensions."""
-        return len(self.centre)
-
-
-@validated(SceneError)
-@dataclass(frozen=True, config=FROZEN)
-class CylinderObstacle:
-    """A round cylinder with `radius` [m] whose axis goes from `start` to `end` [m], (3,).
-
-    `motion` says how it moves, None: not at all; in a scene file its `shape` is "cylinder". Raises `SceneError`.
-    """
-
-    start: Annotated[tuple[Number, ...], Len(3, 3)]
-    end: Annotated[tuple[Number, ...], Len(3, 3)]
-    radius: Positive
-    motion: Motion | None = None
-    shape: Literal["cylinder"] = "cylinder"
-    dim = 3
-
-    @model_validator(mode="after")
-    def _check(self) -> CylinderObstacle:
-        if self.start == self.end:
-            raise ValueError(f"start and end are both {self.start}; give the axis a length")
-        return self
-
-
-@validated(SceneError)
-@dataclass(frozen=True, config=FROZEN)
-class PolygonObstacle:
-    """A polygon in two dimensions with corners `points` [m], (K, 2), in either direction, whose edges do not cross.
-
-    `motion` says how it moves, None: not at all; in a scene file its `shape` is "polygon". Raises `SceneError`.
-    """
-
-    points: Annotated[tuple[Annotated[tuple[Number, ...], Len(2, 2)], ...], Len(3)]
-    motion: Motion | None = None
-    shape: Literal["polygon"] = "polygon"
-    dim = 2
-
-    @model_validator(mode="after")
-    def _check(self) -> PolygonObstacle:
-        x, y = np.array(self.points).T
-        area = 0.5 * float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
-        if abs(area) <= 1e-12 * (np.ptp(x) + np.ptp(y)) ** 2 or len(set(self.points)) < len(self.points):
-            raise ValueError(f"points {self.points} enclose no area or repeat; give each corner once")
-        return self
-
-
-@validated(SceneError)
-@dataclass(frozen=True, config=FROZEN)
-class MeshObstacle:
-    """A closed surface of triangles from an OBJ, STL or PLY file; needs the extra `mesh`.
-
-    Attributes:
-        file: its path; in a scene file relative to that file, in whose folder it must lie.
-        scale: metres per unit of the file, one number or one for each axis.
-        rotation: [degrees] about the file's origin, after scaling.
-        translation: [m], (3,), after turning.
-        motion: how it moves; None: not at all.
-        sha256: what the content of the file must be, as `Scene.to_dict` says it; None: anything.
-        shape: "mesh", as a scene file has it.
-    """
-
-    file: str
-    scale: Scale = (1.0, 1.0, 1.0)
-    rotation: Turn | None = None
-    translation: Annotated[tuple[Number, ...], Len(3, 3)] = (0.0, 0.0, 0.0)
-    motion: Motion | None = None
-    sha256: str | None = None
-    shape: Literal["mesh"] = "mesh"
-    dim = 3
-
-    @model_validator(mode="after")
-    def _take_digest(self) -> MeshObstacle:
-        """Know the mesh by its content: a file that is edited later is another obstacle."""
-        digest = file_digest(self.file)
-        if self.sha256 is None:
-            object.__setattr__(self, "sha256", digest)
-        elif digest not in (None, self.sha256):
-            raise ValueError(changed_mesh(self.file, self.sha256))
-        return self
-
-
-def file_digest(file: str) -> str | None:
-    """SHA-256 of a file's content; None if it cannot be read."""
-    try:
-        with open(file, "rb") as content:
-            found = hashlib.sha256()
-            while chunk := content.read(1 << 20):
-                found.update(chunk)
-            return found.hexdigest()
-    except (OSError, ValueError):  # a zero byte in a path is no OSError
-        return None
-
-
-def changed_mesh(file: str, sha256: str) -> str:
-    """Say that a mesh is not what it was."""
-    return (
-        f"mesh file {file!r} has changed: its content is not that of sha256 {sha256[:12]}...; put the earlier file back"
-    )
-
-
-SHAPES = {
-    "box": BoxObstacle,
-    "sphere": SphereObstacle,
-    "cylinder": CylinderObstacle,
-    "polygon": PolygonObstacle,
-    "mesh": MeshObstacle,
-}
-
-
-def _shape_tag(data: Any) -> str | None:
-    shape = data.get("shape") if isinstance(data, dict) else getattr(data, "shape", None)
-    return f"<{shape}>" if isinstance(shape, str) and shape in SHAPES else None
-
-
-Obstacle = Annotated[
-    Annotated[BoxObstacle, Tag("<box>")]
-    | Annotated[SphereObstacle, Tag("<sphere>")]
-    | Annotated[CylinderObstacle, Tag("<cylinder>")]
-    | Annotated[PolygonObstacle, Tag("<polygon>")]
-    | Annotated[MeshObstacle, Tag("<mesh>")],
-    Discriminator(
-        _shape_tag,
-        custom_error_type="unknown_shape",
-        custom_error_message=f"shape is missing or unknown; choose one of {', '.join(SHAPES)}",
-    ),
-]
-"""A body of any shape; a scene file names it by `shape`."""
 
 
 def _turn_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
