@@ -25,7 +25,7 @@ class SceneScales(SceneFields):
 
         The lattice's planes lie s, 2s, ... from the layer that rests half a spacing from the face, and those nearer than r count:
         one up to r = 2s, two up to 3s, three up to 4s. One plane that has their density and slope in a lattice at rest will
-        not do: a still pool at r = 3s falls through it (docs/validation.md).
+        not do: a still pool at r = 3s falls through it (docs/evidence/validation.md).
         """
         return math.ceil(self.support_ratio - 1e-9) - 1
 
