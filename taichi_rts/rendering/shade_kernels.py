@@ -7,7 +7,7 @@ then every supersample is lit on its own and the average goes from linear light 
 import numpy as np
 
 from taichi_rts.device.backend import ti
-from taichi_rts.rendering.splat_kernels import FAR, NOBODY, Ints, Vectors3, Vectors4, metres_per_pixel, vec3, vec4
+from taichi_rts.rendering.splat_kernels import FAR, NO_PARTICLE, Ints, Vectors3, Vectors4, metres_per_pixel, vec3, vec4
 
 TURNS = 16  # sampling patterns, one for each pixel of a 4 x 4 tile
 GOLDEN = np.pi * (3 - np.sqrt(5))
@@ -267,7 +267,7 @@ def shade_picture(
             number = nearest[s]
             colour = vec3(0, 0, 0)
             thick = below
-            if number != NOBODY:
+            if number != NO_PARTICLE:
                 thick = one
                 sprite = sprites[number]
                 x = (ti.cast(u, ti.f32) + ti.f32(0.5) - sprite[0]) / sprite[3]

@@ -19,7 +19,7 @@ Vectors4: Any = ti.types.ndarray(dtype=vec4, ndim=1)
 Table: Any = ti.types.ndarray(dtype=ti.f32, ndim=2)
 
 FAR = 0x7F000000  # bit pattern of a depth no particle has (1.7e38 m)
-NOBODY = 0x7FFFFFFF
+NO_PARTICLE = 0x7FFFFFFF
 SLACK = 1e-3  # radii by which two kernels' depths may differ: near a silhouette, Vulkan rounds the same root that differently
 SMALLEST = 0.71  # [pixels] radius below which a sphere could fall between pixel centres and vanish
 TILE = 8  # [pixels] side of the tiles that hidden spheres are found by

@@ -151,7 +151,7 @@ class Splatter:
         clear = splat_kernels.clear_buffer
         clear(self._shadow_depth, splat_kernels.FAR)
         clear(self._depth, splat_kernels.FAR)
-        clear(self._nearest, splat_kernels.NOBODY)
+        clear(self._nearest, splat_kernels.NO_PARTICLE)
         clear(self._lines, 0)
         if self.shadows and not flat and count:
             self._project(count, radius, light_eye, light_basis, light_lens)

@@ -1,4 +1,4 @@
-"""One reading per frame: what it holds, that it stays what it is, and that all who look at a frame share it."""
+"""One reading per frame: what it holds, that it stays what it is, and that all that read a frame share it."""
 
 import gc
 

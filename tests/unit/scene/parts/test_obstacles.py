@@ -185,7 +185,7 @@ def test_geometry_and_wall_particles(name):
     x = np.random.default_rng(0).uniform(solid.lower - S, solid.upper + S, (20_000, dim))
     box = np.prod(solid.upper - solid.lower + 2 * S)
     assert (solid.distance(x) < 0).mean() * box == pytest.approx(volume, rel=0.05)
-    assert grid.at(solid.surface(0.1 * S)).max() < 0.02 * S  # a point outside by the grid is outside
+    assert grid.at(solid.surface(0.1 * S)).max() < 0.02 * S  # no point that is outside by the grid is inside
     assert np.abs(grid.at(x) - solid.distance(x)).max() < 0.5 * S
     depth, _ = calibrate_walls(scene(dim))
     walls, normals = line_solid(solid, depth, S)
