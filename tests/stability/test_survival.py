@@ -87,11 +87,10 @@ class FrozenRun:
     def advance_to(self, time):
         self.time = time
 
-    def state(self):
-        return np.full((1, 2), 0.5), np.zeros((1, 2)), np.full(1, 1000.0), np.ones(1)
-
-    def steps(self):
-        return np.full(1, 0.01)
+    def read(self):
+        x, rest = np.full((1, 2), 0.5), np.zeros((1, 2))
+        state = {"positions": x, "velocities": rest, "densities": np.full(1, 1000.0), "steps": np.full(1, 0.01)}
+        return SimpleNamespace(energy=self.energy(), runaways=self.runaways, **state)
 
     def energy(self):
         return SimpleNamespace(total=10.0 * (1.0 + self.gain * self.time / self.end))
