@@ -7,7 +7,6 @@ done is kept in out/levels.json; a second call goes on from there.
 
 import json
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -24,7 +23,7 @@ KEPT = Path("out") / "levels.json"
 
 def measure(combination):
     """Energy over the start's, density over rest and updates; a text where the run failed."""
-    rts.init("cpu", "f32", advanced_optimization=False)
+    rts.init("cpu", "f32", restart=True, advanced_optimization=False)
     try:
         energy, density, updates = run_scene(combination.of(drop_on_pool()), combination.stepper)
     except (AssertionError, rts.Error) as error:
@@ -36,8 +35,8 @@ def main():
     """Run what is missing, and print the largest energy, and the updates, over the four settings of grading and limiter."""
     KEPT.parent.mkdir(exist_ok=True)
     found = json.loads(KEPT.read_text()) if KEPT.exists() else {}
-    with ProcessPoolExecutor(2, get_context("spawn"), max_tasks_per_child=20) as pool:
-        for name, result in pool.map(measure, [each for each in ALL if str(each) not in found]):
+    with get_context("spawn").Pool(2, maxtasksperchild=20) as pool:
+        for name, result in pool.imap(measure, [each for each in ALL if str(each) not in found]):
             found[name] = result
             KEPT.write_text(json.dumps(found, indent=1))
     failed = {name: result for name, result in found.items() if isinstance(result, str)}

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.trials import rerun
 from taichi_rts.trials.rerun import Rerun
 
 POOL, BLOCK = rts.Block((0, 0), (0.8, 0.3)), rts.Block((0.2, 0.35), (0.5, 0.6), velocity=(0, -15))
@@ -31,7 +30,7 @@ def test_another_number_of_ticks_needs_other_kernels(start_taichi, quick):
         kinematic_viscosity=0.0, fluids=[POOL, rts.Block((0, 0.4), (0.4, 0.6), kinematic_viscosity=10.0)]
     )
     with start_taichi("cpu", "f32", **quick):
-        sim = rerun._Unstarted(scene, rts.Asynchronous(courant=0.4))
+        sim = rts.Simulation(scene, rts.Asynchronous(courant=0.4), started=False)
         for courant, serves in ((0.39, True), (0.1, False)):
             stepper = rts.Asynchronous(courant=courant)
             assert sim.schedule.retime(stepper.in_scene(scene), stepper.timeline(scene)) == serves
