@@ -44,7 +44,14 @@ def _part(name: str) -> Any:
     return property(part)
 
 
-@guarded("time", "count", "removed_count", "keeps_work", "keeps_momentum_budget")
+PARTS = (
+    *("particles", "near", "grid", "walls", "medium", "density"),
+    *("motion", "timeline", "schedule", "inflows", "outlets", "sound"),
+)
+"""Parts of the solver that `Simulation` shows as its own; they can be named also once another `init` has ended it."""
+
+
+@guarded("time", "count", "removed_count", "keeps_work", "keeps_momentum_budget", *PARTS)
 class Simulation(Readers):
     """A scene, a stepper, and the state in between.
 
