@@ -6,7 +6,7 @@ import taichi_rts as rts
 from taichi_rts.assembly.inventory import State
 from taichi_rts.device.backend import ti
 
-BYTES = {ti.f32: 4, ti.f64: 8, ti.i32: 4}
+BYTES = {ti.f32: 4, ti.f64: 8, ti.i32: 4, ti.u32: 4}
 
 
 def memory_of(sim: rts.Simulation) -> dict[str, int]:

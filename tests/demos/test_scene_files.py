@@ -9,6 +9,7 @@ import pytest
 import taichi_rts as rts
 from taichi_rts.scene.files.reading import read_scene_file, tomllib
 from taichi_rts.scene.loading import scene_from
+from taichi_rts.scene.obstacles.shapes import BY_NAME
 from taichi_rts.scene.schema import keys_at
 
 FOLDER = Path(__file__).parents[2] / "demos" / "scenes"
@@ -70,7 +71,7 @@ def test_the_schema_knows_every_key_and_no_other():
         data = tomllib.loads(path.read_text(encoding="utf-8"))
         assert set(data) <= set(schema["properties"])
         for fluid in data["fluids"]:
-            kind = "<sphere>" if "radius" in fluid else "<block>"
+            kind = "<Sphere>" if "radius" in fluid else "<Block>"
             assert set(fluid) <= set(keys_at(rts.Scene, ["fluids", 0, kind]))
         for body in data.get("obstacles", ()):
-            assert set(body) <= set(keys_at(rts.Scene, ["obstacles", 0, f"<{body['shape']}>"]))
+            assert set(body) <= set(keys_at(rts.Scene, ["obstacles", 0, f"<{BY_NAME[body['shape']].__name__}>"]))

@@ -126,7 +126,7 @@ def test_no_buffer_of_a_graphics_device_is_larger_than_is_said(
 ):
     scene = rts.load_scene(name, **({"sound_speed": "regional"} if name == "projectile" else {}))
     with start_taichi("cpu", "f32"):
-        for owner in ("backend", "grid"):
+        for owner in ("device.backend", "solver.grid.grid"):
             monkeypatch.setattr(f"taichi_rts.{owner}.on_cpu", lambda: False)
         monkeypatch.setattr("taichi_rts.device.backend.current", lambda: Backend("vulkan", "f32"))
         buffers.clear()

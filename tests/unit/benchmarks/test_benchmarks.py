@@ -45,8 +45,8 @@ def test_memory_counts_every_field_once(taichi_cpu, unstarted):
     scene = peers_dam_break(12)
     sim = rts.Simulation(scene, rts.Uniform())
     sizes = memory_of(sim)
-    assert sizes["particles.x"] == sizes["particles.a"] == 12 * sim.count
-    assert sizes["particles.updated"] == 4 * sim.count
+    assert sizes["solver.particles.x"] == sizes["solver.particles.a"] == 12 * sim.count
+    assert sizes["solver.particles.updated"] == 4 * sim.count
     assert list(sizes.values()) == sorted(sizes.values(), reverse=True)
     assert any(".inside." in path for path in sizes)  # windows
     assert not any(size for path, size in sizes.items() if "real" in path)  # components of vectors, and others' fields

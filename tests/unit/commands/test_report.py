@@ -113,7 +113,7 @@ def test_a_run_that_blew_up_says_where_and_why(capsys, monkeypatch):
 
 
 def test_where_nothing_moves_at_the_start_a_change_of_energy_is_no_share_of_it(capsys, monkeypatch):
-    monkeypatch.setattr(report, "console", report.Console(width=120))
+    monkeypatch.setattr(report, "console", Console(width=120))
     sim = simulation(rts.Uniform(), [1.0], [1.0])
     assert report.energy_scale(sim) == 0.5  # 1 kg at a tenth of 10 m/s
     report.print_table(sim, Energy(0.0, 0.0, 1.7e-7))

@@ -88,8 +88,8 @@ def test_a_comparison_from_the_command_line(tmp_path, capsys, quick_jobs, monkey
     lost.unlink()
     made = []
     run = jobs.run
-    monkeypatch.setattr("taichi_rts.compare.jobs.run", lambda job: made.append(job) or run(job))
-    monkeypatch.setattr("taichi_rts.compare.jobs.find_largest_stable", None)
+    monkeypatch.setattr("taichi_rts.compare.runner.run", lambda job: made.append(job) or run(job))
+    monkeypatch.setattr("taichi_rts.compare.runner.find_largest_stable", None)
     main([*args, "--resume"])
     assert [job.stepper["name"] for job in made] == ["regional"]
     again = json.loads((tmp_path / "out" / "compare.json").read_text())
@@ -162,9 +162,9 @@ def test_a_missing_extra_is_named_before_anything_runs(tmp_path, monkeypatch, ca
 
 def test_a_reference_that_does_not_survive_is_an_error(tmp_path, monkeypatch):
     dead = jobs.Outcome(None, {}, False, "energy +80 %", "cpu f64")
-    monkeypatch.setattr("taichi_rts.compare.jobs.run", lambda job: dead)
+    monkeypatch.setattr("taichi_rts.compare.runner.run", lambda job: dead)
     monkeypatch.setattr(
-        "taichi_rts.compare.jobs.find_largest_stable",
+        "taichi_rts.compare.runner.find_largest_stable",
         lambda job: {"stable": None, "unstable": 0.1, "reason": "energy"},
     )
     scene = rts.load_scene("dam_break_2d", particles=30)

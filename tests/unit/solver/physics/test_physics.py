@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts import simulation
+from taichi_rts.assembly import build
 from taichi_rts.device.backend import ti
 from taichi_rts.medium.energy import measure_energy
 from taichi_rts.medium.equation_of_state import Tait
@@ -73,7 +73,7 @@ def test_pressure_force_is_the_slope_of_the_internal_energy_walls_included(taich
         built.terms = [pressure, *viscosities]
         return MomentumEquation(pressure, viscosities, *others, **options)
 
-    monkeypatch.setattr(simulation, "MomentumEquation", watch)
+    monkeypatch.setattr(build, "MomentumEquation", watch)
     scene = make_scene(dim)
     sim = rts.Simulation(scene, rts.Uniform())
     assert [type(term) for term in built.terms] == [Pressure]  # without viscosity, no viscosity code
