@@ -1,6 +1,6 @@
 """Errors and updates of `Regional` against uniform steps of 0.1 r/c_s, scene by scene: a table of docs/evidence/defaults.md.
 
-python studies/schedule.py [SCENE:PARTICLES ...], about 10 minutes on 2 cores. It uses public names only, so that it also runs in a
+python studies/schedule.py [SCENE:PARTICLES ...], about 10 minutes on 2 cores. It uses public names only, so it also runs in a
 worktree of another commit (PYTHONPATH), whose schedule is to be compared.
 """
 
