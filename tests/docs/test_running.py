@@ -89,7 +89,7 @@ def run_shell(text):
 def run_python(text, page, folder):
     """Run a block; in a program of its own if it starts processes, which import it, or has kernels, whose source is looked up."""
     text = TAKEN_FOR_GRANTED.get(page, "") + replaced(text)
-    if "__main__" in text or "ti.func" in text or "ti.data_oriented" in text:
+    if any(word in text for word in ("__main__", "ti.func", "ti.kernel", "ti.data_oriented")):
         (folder / "block.py").write_text(text)
         subprocess.run([sys.executable, "block.py"], check=True, timeout=300)
     else:

@@ -216,7 +216,7 @@ def test_another_courant_is_another_count(taichi_cpu_f64):
     sim = rts.Simulation(scene, rts.Uniform())
     table = sim.walls[1].table
     assert table.first[1] == math.floor(0.2003 / sim.timeline.tick)
-    sim.timeline = Timeline(0.3 * sim.timeline.tick)
+    sim.solver.timeline = Timeline(0.3 * sim.timeline.tick)
     sim.schedule.begin(sim.timeline, 1)
     sim.step()
     assert table.first[1] == math.floor(0.2003 / sim.timeline.tick)
