@@ -151,7 +151,9 @@ class Simulation(Readers):
         for change in self.scene.gravity_changes:
             if self._time < change.time <= time:  # the potential energy jumps there
                 self._advance(change.time)
-                self._gravity_work += self._potential(change.time) - self._potential(np.nextafter(change.time, 0.0))
+                present = self.read()
+                before = present.potential_energy(float(np.nextafter(change.time, 0.0)))
+                self._gravity_work += present.potential_energy(change.time) - before
         self._advance(time)
         self._check_finite()
 
@@ -195,10 +197,6 @@ class Simulation(Readers):
         yield "stepper", type(self.stepper).__name__
         yield "particles", self.count
         yield "time", self._time
-
-    def _potential(self, time: float) -> float:
-        """Potential energy [J] that the present positions have in the gravity of `time` [s]."""
-        return self.read().potential_energy(time)
 
     def _advance(self, time: float) -> None:
         target = self.timeline.ticks_until(time)

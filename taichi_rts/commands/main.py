@@ -74,9 +74,7 @@ def run_demo(scene: str, **defaults: Any) -> None:
 
 
 def parse_demo(default: Run, args: list[str] | None = None) -> Run:
-    """Parse a demo's command line: the demo's own stepper settings apply to its stepper only, not to others and not to
-    panels.
-    """
+    """Parse a demo's command line: its own settings of a stepper apply to that one only, not to others or to panels."""
     run = tyro.cli(Run, default=default, args=args)
     if run.stepper != default.stepper or run.panels != default.panels:
         run = tyro.cli(Run, default=default.without_stepper(), args=args)

@@ -131,9 +131,7 @@ def _checked(method: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _forget_in_child() -> None:
-    """In a forked child drop Taichi's program: using it, or even ending it, would wait for threads that do not exist
-    there.
-    """
+    """In a forked child drop Taichi's program: to use it, or even to end it, would wait for threads that it lacks."""
     global _lost
     runtime = _runtime()
     started = program(runtime)

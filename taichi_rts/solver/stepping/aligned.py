@@ -23,7 +23,7 @@ class AlignedBlocks(RegionalSchedule):
     from another block and whose own step ends before that of its new block.
     """
 
-    transient = RegionalSchedule.transient | {"occupancy", "ends"}
+    transient = frozenset({"ends"})
     aligned = True
     levels_double = True
 
@@ -63,7 +63,7 @@ class AlignedBlocks(RegionalSchedule):
 
     @ti.func
     def leave(self, block):
-        """Count what `block` has held."""
+        """Hand over to `occupancy` what `block` has held."""
         if self.held[block] > 0:
             self.add(self.occupancy, self.block_level[block], self.held[block])
             self.held[block] = 0
@@ -154,9 +154,7 @@ class AlignedBlocks(RegionalSchedule):
     @ti.kernel
     def count_held(self):
         for block in range(self.blocks):
-            if self.held[block] > 0:
-                self.add(self.occupancy, self.block_level[block], self.held[block])
-                self.held[block] = 0
+            self.leave(block)
 
     def take_counts(self) -> tuple[list[int], list[int]]:
         """Return particles and updates per level since the last call."""

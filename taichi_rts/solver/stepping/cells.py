@@ -105,9 +105,7 @@ class Cells(Schedule):
             ti.atomic_min(self.youngest[None], self.time[self.occupied[m]])
 
     def choose(self, now: int, target: int, cycle_end: int) -> None:
-        """Find the cells that may step before tick `cycle_end`, unless all are past `target`; then the due particles,
-        and what is read.
-        """
+        """Find the cells that may step before tick `cycle_end`, unless all are past `target`; then what is due and read."""
         self.find_ready(target, cycle_end)
         self.claim_neighbourhoods()
         self.choose_cells()

@@ -62,18 +62,28 @@ class Sweep:
         return self.source[block]
 
     @ti.func
-    def finish(self, block, shortest):
-        """Limit the level of `block` beside others, the least of which is given."""
-        level = self.source[block]
-        if shortest != EMPTY:
-            level = ti.min(level, self.most(shortest))
-        self.target[block] = level
+    def finish(self, block, around):
+        """Limit the level of `block` beside others; `around` is the least of what is read of those."""
+        self.target[block] = self.limited(block, around)
         if ti.static(self.goes_on):
             self.then(block)
 
+    @ti.func
+    def limited(self, block, around):
+        """Level of `block`."""
+        return self.beside(block, around)
+
+    @ti.func
+    def beside(self, block, shortest):
+        """Level of `block` beside others, the `shortest` of which is given."""
+        level = self.source[block]
+        if shortest != EMPTY:
+            level = ti.min(level, self.most(shortest))
+        return level
+
 
 @ti.data_oriented
-class GrowingSweep:
+class GrowingSweep(Sweep):
     """The first `Sweep` where levels grow slowly: R_min on what blocks allow themselves, and only then growth.
 
     The other way round R_min would be contagious: it would act on levels that growth has cut to those of the last step, which
@@ -83,7 +93,7 @@ class GrowingSweep:
     limit on a level beside the last ones of its neighbours.
     """
 
-    transient = frozenset({"most", "growth", "then", "goes_on"})
+    transient = frozenset({"growth"})
     sees_last = True
 
     def __init__(
@@ -97,9 +107,8 @@ class GrowingSweep:
         present: ti.Field,
         then: Any = None,
     ) -> None:
-        self.source, self.last, self.target, self.present = source, last, target, present
-        self.ladder, self.most, self.growth = ladder, most, growth
-        self.then, self.goes_on = then, then is not None
+        super().__init__(source, target, most, then)
+        self.last, self.ladder, self.growth, self.present = last, ladder, growth, present
 
     @ti.func
     def read(self, block):
@@ -107,16 +116,12 @@ class GrowingSweep:
         return ti.Vector([self.source[block], self.last[block]])
 
     @ti.func
-    def finish(self, block, around):
-        """Find the level of `block`; `around` holds the least of what neighbours allow themselves and of their last levels."""
-        level, before = self.source[block], self.last[block]
-        if around[0] != EMPTY:
-            level = ti.min(level, self.most(around[0]))
+    def limited(self, block, around):
+        """Level of `block`; `around` holds the least of what neighbours allow themselves and of their last levels."""
+        level, before = self.beside(block, around[0]), self.last[block]
         if before != EMPTY:
             level = self.ladder.grown(level, before, around[1], self.present[None], self.growth)
-        self.target[block] = level
-        if ti.static(self.goes_on):
-            self.then(block)
+        return level
 
 
 @ti.data_oriented

@@ -61,7 +61,7 @@ FROM_LEVELS: dict[str, Any] = {
 }
 
 
-PAPERS: dict[str, Any] = {"steps": "integers", "beta_decay": 0.2}
+PAPERS: dict[str, Any] = {key: PRESETS["paper"][key] for key in ("steps", "beta_decay")}
 """The paper's levels, within Eq. 1 by a smaller courant."""
 
 
@@ -87,8 +87,7 @@ class Regional(Stepper):
         grading: let the levels of neighbouring blocks differ by at most one (R_min alone leaves jumps from 1 to 3).
         limiter: the neighbour limiter: no block's step exceeds twice a neighbour's, and steps grow by one level at a time, when
             synchronised. (Waking needs none: line 12 re-evaluates particles whose block has another step.) None: on
-            from three
-            levels up, off in the paper's preset.
+            from three levels up, off in the paper's preset.
         inactive_density: what due particles read of others: "stale" (of the last evaluation) or "extrapolated".
         steps: levels that blocks may have: "integers", "half_octaves" (1, 2, 3, 4, 6, 8, 12, ...) or "powers_of_two"; None: half
             octaves, but integers in the paper's preset and where n_max is no half octave. Except for integers with one sound

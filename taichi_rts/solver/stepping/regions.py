@@ -32,7 +32,7 @@ class RegionalSchedule(Schedule):
     A scheme adds `update_validity`, which finds what is due in a block.
     """
 
-    transient = frozenset({"scan", "updates", "rows", "present", "passed"})
+    transient = frozenset({"scan", "occupancy", "updates", "rows", "present", "passed"})
     reach_of_regions = 1
     """How much longer than a neighbour's a block's step may be at once: 1 is the paper's R_min."""
 
@@ -79,7 +79,7 @@ class RegionalSchedule(Schedule):
 
     # -- which rules there are ----------------------------------------------------------------------------------------
 
-    def make_sweeps(self, grading: bool) -> list[Sweep | GrowingSweep]:
+    def make_sweeps(self, grading: bool) -> list[Sweep]:
         """Return the sweeps from `raw_level` to `block_level`: R_min and growth, the limiter's, and those of grading.
 
         Each spreads by a block; the last goes on with lines 10-16 for each block that it is done with.
@@ -95,7 +95,7 @@ class RegionalSchedule(Schedule):
         left = len(rules)
         target, then = to_and_fro[left % len(to_and_fro)], self.settle if left == 0 else None
         most = self.same if self.reach_of_regions == 1 else self.twice
-        sweeps: list[Sweep | GrowingSweep] = [Sweep(self.raw_level, target, most, then)]
+        sweeps: list[Sweep] = [Sweep(self.raw_level, target, most, then)]
         if self.limits:
             growth = self.ladder.above if grading else self.twice
             growing = (self.ladder, most, growth, self.present, then)
@@ -213,10 +213,9 @@ class RegionalSchedule(Schedule):
 
     @ti.func
     def region(self, base_step, reach, speed2, acceleration2, viscosity, density):
-        """Section 2: the largest level whose step satisfies Eq. 2, Eq. 3, the viscous limit and Eq. 1 with the local sound
-        speed.
+        """Section 2: the largest level whose step satisfies Eq. 2, Eq. 3, the viscous limit and Eq. 1.
 
-        (With c_s Eq. 1 is the same for all blocks: it sets the base step.)
+        Eq. 1 with the local sound speed: with c_s it is the same for all blocks, and sets the base step.
         """
         level = 1
         for n in ti.static(self.lengths[1:]):
