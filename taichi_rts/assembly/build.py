@@ -17,11 +17,15 @@ from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.geometry import Geometry
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.grid.windows import FluidWindows, WallWindows
-from taichi_rts.solver.motion.inflow import Inflows
+from taichi_rts.solver.motion.books import Books
+from taichi_rts.solver.motion.inflow import Guide, Inflows, Patch
 from taichi_rts.solver.motion.motion import Motion
+from taichi_rts.solver.motion.observing import WallObserver
 from taichi_rts.solver.motion.outlet import Outlets
+from taichi_rts.solver.particles.extra import Extra
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
 from taichi_rts.solver.particles.particles import FluidState
+from taichi_rts.solver.particles.past import Past
 from taichi_rts.solver.physics.continuity import ContinuityDensity, DensityDiffusion, MirroredPressure
 from taichi_rts.solver.physics.density import Density, SummationDensity
 from taichi_rts.solver.physics.momentum import Gravity, MomentumEquation, Pressure
@@ -45,9 +49,10 @@ def assemble(
     """
     timeline = stepper.timeline(scene)
     needs = optional_fields(scene, stepper, debug)
-    inflows = Inflows(scene, start.mass) if scene.inflows else None
-    particles = make_particles(scene, start, backend, needs, inflows.capacity if inflows else 0)
+    patches = [Patch(scene, number) for number in range(len(scene.inflows))]
+    particles = make_particles(scene, start, backend, needs, sum(patch.particles for patch in patches))
     geometry = make_geometry(scene, stepper)
+    past = [Past(particles, geometry)] if particles.has_past else []
     grid = BlockGrid(geometry, particles.capacity, particles.alive)
     sound = SoundRule(scene, particles, grid) if particles.has_sound else None
     medium = make_medium(scene, start, particles, sound)
@@ -56,21 +61,30 @@ def assemble(
     particles.carry(grid.cell_of)
     walls = make_walls(scene, start, near, grid, backend)
     windows = make_windows(scene, near, grid, walls, backend, needs)
-    density = DENSITIES[scene.density](particles, near, grid, windows, walls, medium, backend)
+    density = DENSITIES[scene.density](particles, near, grid, windows, walls, medium, backend, past)
+    momentum = make_momentum(scene, particles, near, grid, windows, walls, medium, backend, own)
     motion = Motion(
         particles,
         near,
         grid,
-        make_momentum(scene, particles, near, grid, windows, walls, medium, backend, own),
+        momentum,
         stepper.make_integrator(),
         medium,
-        integrates_density=density.integrates,
+        density,
         obstacles=make_keepers(scene, geometry),
+        past=past,
+        guides=[Guide(particles)] if patches else [],
+        books=[Books(particles, momentum)] if debug else [],
     )
+    inflows = Inflows(scene, start.mass, patches, particles, past) if patches else None
     outlets = Outlets(scene, motion, start.mass) if scene.outlets else None
     schedule = stepper.schedule(scene, particles, grid, timeline)
     schedule.debug, schedule.sound = debug, sound
-    solver = Solver(particles, near, grid, walls, medium, density, motion, timeline, schedule, inflows, outlets, sound)
+    observer = WallObserver(momentum.moving, grid) if momentum.moving else None
+    extras: list[Extra] = [extra for extra in (inflows, outlets, sound, observer) if extra is not None]
+    solver = Solver(
+        particles, near, grid, walls, medium, density, motion, timeline, schedule, inflows, outlets, sound, extras
+    )
     solver.ticking = parts(solver, Ticking)
     solver.count_in(timeline.tick)
     return solver

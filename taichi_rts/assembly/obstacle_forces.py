@@ -4,7 +4,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from taichi_rts.assembly.run import Run
 from taichi_rts.device.backend import Backend, ti
+from taichi_rts.device.ownership import Start, guarded
+from taichi_rts.errors import Error
 from taichi_rts.sampling.walls import WallLayer
 from taichi_rts.scene.geometry.bodies import bodies
 from taichi_rts.scene.geometry.periodic import nearest_image, periods
@@ -94,3 +97,25 @@ class ForceMeter:
                 total = self.sums[w](k)
                 for d in ti.static(range(self.motion.particles.dim)):
                     rates[w, i, d] = total[d]
+
+
+@guarded()
+class Measured(Run):
+    """What `Simulation` measures of its obstacles."""
+
+    obstacle_layers: tuple[WallLayer, ...]
+    taichi_start: Start
+    _meter: ForceMeter | None = None
+
+    def obstacle_forces(self) -> ObstacleForces:
+        """Forces [N] and torques [N m] of the fluid on each obstacle, in the scene's order, at the last step up to `time`.
+
+        The first call compiles; asking changes nothing in the run. Raises `Error` for a scene without obstacles.
+        """
+        if not self.scene.obstacles:
+            raise Error(f"scene {self.scene.name!r} has 0 obstacles, so no force acts on one; give it at least 1")
+        if self._meter is None:
+            self.taichi_start.require_thread()
+            self._meter = ForceMeter(self.local, self.motion, self.obstacle_layers, self.walls, self.backend)
+        found = self._meter.measure(self.medium.mass, self.timeline.now, self.timeline.tick)
+        return found._replace(pivots=found.pivots + np.asarray(self.origin))

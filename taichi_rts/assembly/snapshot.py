@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.assembly.run import Run
-from taichi_rts.device.backend import ti
-from taichi_rts.solver.physics.timetable import LAST
 
 
 @dataclasses.dataclass(frozen=True)
@@ -21,12 +19,9 @@ class Snapshot:
     Attributes:
         positions, velocities: (N, dim) [m], counted from `Simulation.origin`, and [m/s].
         densities: (N,) [kg/m^3].
-        guided_until: (N,) times [s] until which an inflow prescribes the velocity, where there is one.
-        sound: sound speeds [m/s] and reference densities [kg/m^3], (2, N), where the sound speed is regional.
         born: how many ids have been given.
-        layers: how many layers each inflow has let in; `entered` is their energy [J].
-        removed: how many particles each outlet has taken out; `left` is their energy and the work done on them, (2,) [J].
         gravity_work: energy [J] that changes of gravity have put in.
+        extras: what `Extra.kept` of each extra says, by the name of its class.
     """
 
     time: float
@@ -34,48 +29,23 @@ class Snapshot:
     positions: np.ndarray
     velocities: np.ndarray
     densities: np.ndarray
-    guided_until: np.ndarray | None
-    sound: np.ndarray | None
     born: int
-    layers: tuple[int, ...]
-    entered: float
-    removed: tuple[int, ...]
-    left: tuple[float, float]
     gravity_work: float
+    extras: dict[str, Any]
 
     @classmethod
-    def of(
-        cls, run: Run, state: tuple[np.ndarray, np.ndarray, np.ndarray], ids: np.ndarray, gravity_work: float
-    ) -> Snapshot:
+    def of(cls, run: Run, state: tuple[np.ndarray, np.ndarray, np.ndarray], ids: np.ndarray) -> Snapshot:
         """Return that of `run` at its present time, when it has this `state`: positions, velocities and densities."""
-        p, inflows, outlets = run.particles, run.inflows, run.outlets
-        return cls(
-            time=run.time,
-            ids=ids,
-            positions=state[0],
-            velocities=state[1],
-            densities=state[2],
-            guided_until=p.to_numpy(p.guided_until) * run.timeline.tick if p.has_guide else None,
-            sound=np.stack([p.to_numpy(p.sound), p.to_numpy(p.reference)]) if p.has_sound else None,
-            born=p.born,
-            layers=tuple(inflows.done) if inflows else (),
-            entered=inflows.energy if inflows else 0.0,
-            removed=tuple(outlets.removed) if outlets else (),
-            left=(outlets.energy, outlets.work) if outlets else (0.0, 0.0),
-            gravity_work=gravity_work,
-        )
+        kept = {type(extra).__name__: extra.kept(run.timeline.tick) for extra in run.solver.extras}
+        return cls(run.time, ids, *state, run.particles.born, run.gravity_work, kept)
 
     def put_into(self, run: Run) -> None:
         """Give this state to the parts of `run`, of the same scene; `time` has to be a tick of its clock."""
         now = round(self.time / run.timeline.tick)
         run.timeline.now = now
         self._fill(run, now)
-        if run.inflows:
-            run.inflows.done, run.inflows.energy = list(self.layers), self.entered
-        if run.outlets:
-            run.outlets.removed = list(self.removed)
-            run.outlets.energy, run.outlets.work = self.left
-            run.outlets.looks = 0
+        for extra in run.solver.extras:
+            extra.go_on(self.extras.get(type(extra).__name__), now, run.timeline.tick)
         run.grid.order.from_numpy(np.arange(run.particles.capacity, dtype=np.int32))
         run.grid.forget()
         run.schedule.read_at.fill(0)
@@ -96,28 +66,12 @@ class Snapshot:
         p.alive[None] = count
         for field in p.reals:
             field.fill(0)
-
-        def put(field: Any, values: Any, rest: float = 0) -> None:
-            whole = field.to_numpy()
-            whole[:count], whole[count:] = values, rest
-            field.from_numpy(whole)
-
-        put(p.x, self.positions)
-        put(p.v, self.velocities)
-        put(p.rho, self.densities, run.scene.rest_density)
-        put(p.updated, np.full(count, now, np.int32))
+        p.put(p.x, self.positions)
+        p.put(p.v, self.velocities)
+        p.put(p.rho, self.densities, run.scene.rest_density)
+        p.put(p.updated, np.full(count, now, np.int32))
         p.identity.from_numpy(np.concatenate([self.ids, np.arange(self.born, p.capacity), gone]).astype(np.int32))
-        if self.guided_until is not None:
-            until = np.ceil(self.guided_until / run.timeline.tick * (1.0 - 1e-12))
-            put(p.guided_until, np.minimum(until, LAST).astype(np.int32))
         if p.has_viscosity:
             own = np.full(self.born, run.scene.viscosities[-1])
             own[: len(run.start_viscosities)] = run.start_viscosities
-            put(p.viscosity, own[self.ids])
-        if run.sound:
-            for field in vars(run.sound).values():
-                if isinstance(field, ti.Field):
-                    field.fill(0)
-            sound, reference = (run.sound.floor, run.scene.rest_density) if self.sound is None else self.sound
-            put(p.sound, sound, run.sound.floor)
-            put(p.reference, reference, run.scene.rest_density)
+            p.put(p.viscosity, own[self.ids])

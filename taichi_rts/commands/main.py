@@ -16,11 +16,13 @@ import taichi_rts as rts
 from taichi_rts import importing
 from taichi_rts.benchmarks.command import Bench
 from taichi_rts.commands import report
+from taichi_rts.commands.options import StepperOptions
 from taichi_rts.commands.plain_text import use_plain_text
 from taichi_rts.commands.run import Run
 from taichi_rts.compare.command import Compare
 from taichi_rts.device import backend
 from taichi_rts.errors import Error
+from taichi_rts.output.options import replaced
 from taichi_rts.output.side_by_side import SideBySide
 from taichi_rts.stability.command import Stability
 from taichi_rts.terminal import execute
@@ -70,14 +72,14 @@ def main(args: list[str] | None = None) -> None:
 def run_demo(scene: str, **defaults: Any) -> None:
     """Run a demo: `taichi-rts run SCENE` with other defaults; takes the same options."""
     with _program():
-        execute(parse_demo(Run(scene=scene, **{"output_dir": Path("out") / scene} | defaults)))
+        execute(parse_demo(replaced(Run(), {"scene": scene, "output_dir": Path("out") / scene} | defaults)))
 
 
 def parse_demo(default: Run, args: list[str] | None = None) -> Run:
     """Parse a demo's command line: its own settings of a stepper apply to that one only, not to others or to panels."""
     run = tyro.cli(Run, default=default, args=args)
-    if run.stepper != default.stepper or run.panels != default.panels:
-        run = tyro.cli(Run, default=default.without_stepper(), args=args)
+    if run.stepping.stepper != default.stepping.stepper or run.panels != default.panels:
+        run = tyro.cli(Run, default=dataclasses.replace(default, stepping=StepperOptions()), args=args)
     return run
 
 

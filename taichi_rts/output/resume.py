@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import json
 import warnings
 from collections.abc import Iterator, Sequence
@@ -13,6 +12,7 @@ from typing import Any
 from taichi_rts.errors import CheckpointError, SceneError
 from taichi_rts.files.archive import open_archive
 from taichi_rts.output.checkpoint import Checkpoint, differences
+from taichi_rts.output.options import given, replaced
 from taichi_rts.output.panels import Panel
 from taichi_rts.scene.files.reading import parts_with_files
 from taichi_rts.scene.loading import scene_from
@@ -121,18 +121,9 @@ def require_same(checkpoint: Checkpoint, steppers: Sequence[Any], settings: dict
         raise CheckpointError(f"{path} is of another run: {found}; leave it out, or start a new run")
 
 
-def given_options(options: Any) -> dict[str, Any]:
-    """Return the options of a command, a frozen dataclass, that are not its defaults, by name."""
-    return {
-        field.name: getattr(options, field.name)
-        for field in dataclasses.fields(options)
-        if getattr(options, field.name) != field.default
-    }
-
-
 def command_data(options: Any) -> dict[str, Any]:
     """Return what a checkpoint keeps of the command that made the run."""
-    return {key: value for key, value in given_options(options).items() if key not in FOR_THIS_COMMAND}
+    return {key: value for key, value in given(options).items() if key not in FOR_THIS_COMMAND}
 
 
 def continued(options: Any, path: Path, checkpoint: Checkpoint) -> tuple[Any, Scene, list[Panel]]:
@@ -141,20 +132,23 @@ def continued(options: Any, path: Path, checkpoint: Checkpoint) -> tuple[Any, Sc
     All is as it was, except for what `options` (of `taichi-rts run`) give and what does not count for the steps. Raises
     `CheckpointError` for what does, if it differs.
     """
-    given, kind = given_options(options), type(options)
+    said = given(options)
     kept = checkpoint.extra.get("command", {})
-    before = kind(**{key: tuple(value) if isinstance(value, list) else value for key, value in kept.items()})
-    run = dataclasses.replace(before, **given)
-    scene = resumed_scene(checkpoint, run.load() if SCENE_OPTIONS & set(given) else None, options.end_time)
-    panels = run.make_panels(scene.name, run.make_stepper())
-    if "command" not in checkpoint.extra and not (run.stepper or run.panels or run.stepper_options()):
+    before = replaced(
+        type(options)(), {key: tuple(value) if isinstance(value, list) else value for key, value in kept.items()}
+    )
+    run = replaced(before, said)
+    scene = resumed_scene(checkpoint, run.scene.load() if SCENE_OPTIONS & set(said) else None, options.scene.end_time)
+    panels = run.make_panels(scene.name, run.stepping.make())
+    if "command" not in checkpoint.extra and not (run.stepping.stepper or run.panels or run.stepping.parameters()):
         panels = [Panel("", checkpoint.steppers[0])]  # a script saved it
     settings = {
         "precision": (checkpoint.precision, options.precision or checkpoint.precision),
         "debug": (checkpoint.debug, options.debug or checkpoint.debug),
-        "export_fps": (before.export_fps if kept else run.export_fps, run.export_fps),
+        "export_fps": (before.files.export_fps if kept else run.files.export_fps, run.files.export_fps),
     }
     require_same(checkpoint, list(dict.fromkeys(panel.stepper for panel in panels)), settings)
     own = {"precision": checkpoint.precision, "debug": checkpoint.debug}
     own |= {"arch": checkpoint.arch} if options.arch == "auto" else {}
-    return dataclasses.replace(run, output_dir=options.output_dir or output_folder(path), **own), scene, panels
+    own["output_dir"] = options.files.output_dir or output_folder(path)
+    return replaced(run, own), scene, panels

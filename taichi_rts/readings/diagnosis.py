@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.device.counts import CELLS_PER_BLOCK
+from taichi_rts.errors import SimulationDivergedError
 from taichi_rts.readings.reading import Readable, Reading
 from taichi_rts.scene.placing import placed
 from taichi_rts.solver.motion.motion import RUNAWAY_ACCELERATION, RUNAWAY_SPEED
@@ -53,6 +54,12 @@ class Diagnosis:
             f"at t = {self.time:.4g} s particle {self.particle} at ({place}) m, level {self.level} with a step of "
             f"{1e3 * self.step:.3g} ms: {self.exceeded}. {self.criteria}Likely cause: {self.cause}. Remedy: {self.remedy}."
         )
+
+
+def require_whole(state: Reading) -> None:
+    """Raise `SimulationDivergedError` with a diagnosis if the run has blown up."""
+    if (found := diagnose(state)) is not None:
+        raise SimulationDivergedError(f"blown up: {found}")
 
 
 def diagnose(state: Readable) -> Diagnosis | None:

@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
+import weakref
+
 import numpy as np
 
+from taichi_rts.assembly.run import Run
 from taichi_rts.device.ownership import guarded
 from taichi_rts.medium.energy import Energy
-from taichi_rts.readings.reading import Reading
+from taichi_rts.readings.diagnosis import require_whole
+from taichi_rts.readings.reading import Moment, Reading
 from taichi_rts.scene.placing import placed
-from taichi_rts.scene.scene import Scene
 
 
 @guarded()
-class Readers:
+class Readers(Run):
     """The readers of `Simulation`: arrays are in order of particle id, N is the number of particles that are there."""
 
-    scene: Scene
+    transient = frozenset({"_latest"})
+    _latest: weakref.ref[Reading] | None = None
 
     def read(self) -> Reading:
-        """Return the present state."""
-        raise NotImplementedError
+        """Return the present state: one object for all that ask at one time, as long as any of them holds it."""
+        found = self._latest() if self._latest else None
+        if found is None or found.moment != Moment.of(self):
+            found = Reading.of(self)
+            self._latest = weakref.ref(found)
+        return found
+
+    def restored(self) -> None:
+        """Take note that fields and values have been put back to what they were at another time."""
+        self.grid.restored()
+        self._latest = None
 
     def ids(self) -> np.ndarray:
         """Stable ids, (N,), of the particles that all readers speak of, ascending; an outlet takes some out for good."""
@@ -89,3 +102,11 @@ class Readers:
     def momentum(self) -> np.ndarray:
         """Total momentum [kg m/s], (dim,), at `time`."""
         return self.read().momentum.copy()
+
+    def check(self) -> None:
+        """Raise `SimulationDivergedError` with a diagnosis if the run has blown up, as a recording does at every frame.
+
+        That is: a state is not finite, speeds or accelerations had to be limited, or a density is not between 0.02 and 2 of
+        rest. It reads the state, so it is for once in a while; `advance_to` itself notices only what is not finite.
+        """
+        require_whole(self.read())

@@ -94,12 +94,8 @@ class Reading:
     _start_fluids: np.ndarray
 
     @classmethod
-    def of(cls, run: Run, start_fluids: np.ndarray, updates: int) -> Reading:
-        """Read the present state of `run`: one kernel, and with a regional sound speed two fields more.
-
-        `start_fluids`, (N at the start,), are the places in the scene of the fluids of those particles that were there at the
-        start, `updates` the particle updates so far.
-        """
+    def of(cls, run: Run) -> Reading:
+        """Read the present state of `run`: one kernel, and with a regional sound speed two fields more."""
         p, moment, medium = run.particles, Moment.of(run), run.medium
         dtype, born = run.backend.numpy_dtype, p.born
         x, v, a = (np.empty((born, run.scene.dim), dtype) for _ in range(3))
@@ -132,13 +128,13 @@ class Reading:
             base_steps=level,
             evaluated=updated,
             sound_speeds=sounds,
-            particle_updates=updates,
+            particle_updates=run.tally.particle_updates,
             inflow=medium.mass * inflows.entered if inflows else None,
             outflows=tuple(medium.mass * n for n in outlets.removed) if outlets else (),
             runaways=int(run.motion.runaways),
             not_finite=int(run.motion.not_finite),
             _born=born,
-            _start_fluids=start_fluids,
+            _start_fluids=run.start_fluids,
         )
 
     def read(self) -> Reading:

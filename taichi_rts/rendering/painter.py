@@ -35,16 +35,27 @@ class PictureOptions:
     """
 
     width: int = 1280
+    """Width of a frame [pixels]."""
     height: int = 720
+    """Height of a frame [pixels]."""
     renderer: Literal["splatter", "ggui"] = "splatter"
+    """splatter needs no Vulkan and no display; ggui is Taichi's own."""
     colour_by: Mode = "level"
+    """What colours show."""
     palette: Literal["default", "paper"] = "default"
+    """Colours of levels: safe for colour-blind readers, or the paper's red, green, blue."""
     azimuth: float | None = None
+    """Camera angle around the vertical [degrees]."""
     elevation: float | None = None
+    """Camera angle above the ground [degrees]."""
     legend: bool = True
+    """Draw the legend, with time and scale."""
     quality: Literal["draft", "good", "best"] = "good"
+    """Splatter: draft has no shadows, best four times the samples of good (docs/rendering.md)."""
     transparent: bool = False
+    """Splatter: frames with an alpha channel instead of a white background; shadows stay."""
     views: tuple[ViewName, ...] = ()
+    """Views side by side in each frame: any of scene, front, side and top; by default the scene's alone."""
 
     def __post_init__(self) -> None:
         if self.renderer == "ggui" and (self.transparent or self.quality != "good"):

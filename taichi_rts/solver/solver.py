@@ -11,6 +11,7 @@ from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.motion.inflow import Inflows
 from taichi_rts.solver.motion.motion import Motion
 from taichi_rts.solver.motion.outlet import Outlets
+from taichi_rts.solver.particles.extra import Extra
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
 from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.physics.density import Density
@@ -27,6 +28,7 @@ class Solver:
 
     Attributes:
         inflows, outlets, sound: what only some scenes have, else None.
+        extras: these, and whatever else only some runs have, in the order in which their hooks are called.
         ticking: what is counted in ticks since each piece of its motion began.
     """
 
@@ -42,6 +44,7 @@ class Solver:
     inflows: Inflows | None = None
     outlets: Outlets | None = None
     sound: SoundRule | None = None
+    extras: list[Extra] = field(default_factory=list)
     ticking: list[Any] = field(default_factory=list)
     sorts: int = 0
     counted_in: float = 0.0
@@ -58,12 +61,8 @@ class Solver:
 
         `before_change()` is called before the number of particles changes.
         """
-        if self.inflows and self.inflows.waiting(now * tick):
-            before_change()
-            self.inflows.enter(self.particles, now, tick)
-        if self.outlets and (leaving := self.outlets.find(now, tick)):
-            before_change()
-            self.outlets.take_out(leaving, now, tick)
+        for extra in self.extras:
+            extra.before_sort(now, tick, before_change)
         if self.sorts % REORDER_EVERY == 0:
             self.particles.reorder(self.grid.order)
             if self.grid.tracks_arrivals:
@@ -72,12 +71,12 @@ class Solver:
         self.motion.sort_particles(now, tick)
         self.schedule.sorted(now, tick)
 
-    def find_sound(self, now: int, tick: float) -> None:
-        """Work out the regional sound speeds at tick `now`, where there are any."""
-        if self.sound and self.schedule.needs_sound:
-            self.sound.update(self.schedule.read_at, now, tick)
+    def before_regions(self, now: int, tick: float) -> None:
+        """Let extras do what comes before lines 5-16 at tick `now`."""
+        for extra in self.extras:
+            extra.before_regions(self.schedule, now, tick)
 
-    def observe_walls(self, now: int, tick: float) -> None:
-        """Note where moving walls are for the due particles, where there are any."""
-        if self.motion.moving_walls:
-            self.motion.observe_walls(self.schedule, now, tick)
+    def before_forces(self, now: int, tick: float) -> None:
+        """Let extras do what comes before lines 18-29 at tick `now`."""
+        for extra in self.extras:
+            extra.before_forces(self.schedule, now, tick)

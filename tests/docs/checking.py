@@ -61,18 +61,18 @@ def check_ours(args, loaded):
 
 def check_run(run, loaded):
     """Check what `Run` says before anything starts."""
-    stepper = run.make_stepper()
-    check_size(run.width, run.height)
-    check_angles(run.azimuth, run.elevation)
+    stepper = run.stepping.make()
+    check_size(run.pictures.width, run.pictures.height)
+    check_angles(run.pictures.azimuth, run.pictures.elevation)
     if run.resume is not None:
         return
-    key = (run.scene, run.particles, run.spacing, run.sound_speed, run.end_time)
+    key = run.scene
     if key not in loaded:
-        loaded[key] = run.load()
+        loaded[key] = run.scene.load()
     scene = loaded[key]
     run.make_panels(scene.name, stepper)
-    make_cameras(scene, run.picture())
-    rts.Exporter("out", run.export, run.attributes, dim=scene.dim)
+    make_cameras(scene, run.pictures)
+    rts.Exporter("out", run.files.export, run.files.attributes, dim=scene.dim)
 
 
 def check_module(rest):

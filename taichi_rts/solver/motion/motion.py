@@ -7,8 +7,12 @@ from taichi_rts.device.backend import ti
 from taichi_rts.device.counters import Counters
 from taichi_rts.medium.medium import Medium
 from taichi_rts.solver.grid.grid import BlockGrid
+from taichi_rts.solver.motion.books import Books
+from taichi_rts.solver.motion.inflow import Guide
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
 from taichi_rts.solver.particles.particles import FluidState
+from taichi_rts.solver.particles.past import Past
+from taichi_rts.solver.physics.density import Density
 from taichi_rts.solver.physics.momentum import MomentumEquation
 from taichi_rts.solver.physics.moving_walls import MovingFace
 
@@ -25,6 +29,7 @@ class Motion:
     """Prediction and correction with one integrator. `now` is a tick, `tick` its length [s].
 
     `read_at[block]` says when a block's particles are read, in ticks after `now`, and is negative where they are not read.
+    `past`, `guides` and `books` hold one object or none.
     """
 
     def __init__(
@@ -35,12 +40,15 @@ class Motion:
         momentum: MomentumEquation,
         integrator: Any,
         medium: Medium,
+        formulation: Density,
         *,
-        integrates_density: bool = False,
         obstacles: Sequence[Any] = (),
+        past: Sequence[Past] = (),
+        guides: Sequence[Guide] = (),
+        books: Sequence[Books] = (),
     ) -> None:
-        self.integrates_density = integrates_density
-        self.moving_walls = momentum.moving
+        self.formulation = formulation
+        self.past, self.guides, self.books = list(past), list(guides), list(books)
         self.faces = [wall for wall in momentum.moving if isinstance(wall, MovingFace)]
         self.obstacles = list(obstacles)
         self.particles = particles
@@ -69,33 +77,23 @@ class Motion:
     def position(self, i, dt, tick):
         """Position [m] of particle `i`, `dt` [s] after its last evaluation, kept inside the domain.
 
-        Within its step that is the prediction; before it (dt < 0) the cubic through the positions and velocities of its
-        last two evaluations (Hermite), so that reading at an earlier time interpolates as well.
+        Within its step that is the prediction; before it (dt < 0) it is interpolated, where there is a `Past`.
         """
         p = self.particles
         x = self.integrator.predict_position(p.x[i], p.v[i], p.a[i], dt)
-        if ti.static(p.has_past):
+        for past in ti.static(self.past):
             if dt < 0.0:
-                h = ti.cast(p.updated[i] - p.past_updated[i], float) * tick
-                s = 1.0 + dt / h
-                ascent, descent = s * s * (3.0 - 2.0 * s), (1.0 - s) * (1.0 - s) * (1.0 + 2.0 * s)
-                slopes = (1.0 - s) * p.past_v[i] - s * p.v[i]
-                x = descent * p.past_x[i] + ascent * p.x[i] + (s * (1.0 - s) * h) * slopes
+                x = past.position(i, dt, tick)
         return self.geometry.place(x)
-
-    @ti.func
-    def share_of_past(self, i, dt, tick):
-        """How much the evaluation before the last counts, `dt` < 0 [s] after the last, in linear interpolation."""
-        return -dt / (ti.cast(self.particles.updated[i] - self.particles.past_updated[i], float) * tick)
 
     @ti.func
     def velocity(self, i, dt, tick):
         """Velocity [m/s] of particle `i` that forces see, `dt` [s] after its last evaluation."""
         p = self.particles
         v = self.integrator.predict_velocity(p.v[i], p.a[i], dt)
-        if ti.static(p.has_past):
+        for past in ti.static(self.past):
             if dt < 0.0:
-                v = p.v[i] + self.share_of_past(i, dt, tick) * (p.past_v[i] - p.v[i])
+                v = past.velocity(i, dt, tick)
         return v
 
     @ti.func
@@ -105,9 +103,9 @@ class Motion:
         rho = p.rho[i]
         if ti.static(p.has_rho_rate):
             rho += p.rho_rate[i] * dt
-        if ti.static(p.has_past):
+        for past in ti.static(self.past):
             if dt < 0.0:
-                rho = p.rho[i] + self.share_of_past(i, dt, tick) * (p.past_rho[i] - p.rho[i])
+                rho = past.density(i, dt, tick)
         return rho
 
     @ti.func
@@ -152,15 +150,6 @@ class Motion:
                         self.near.viscosity[k] = self.particles.viscosity[i]
 
     @ti.kernel
-    def observe_walls(self, due: ti.template(), now: ti.i32, tick: float):
-        """Note for every particle that is due in the schedule `due` where the moving walls are at its time."""
-        for n in range(due.due_count[None]):
-            k = due.due[n]
-            present = now + due.read_at[self.grid.block(self.grid.order[k])]
-            for wall in ti.static(self.moving_walls):
-                wall.observe(k, present, tick)
-
-    @ti.kernel
     def advance_due(self, due: ti.template(), now: ti.i32, tick: float):
         """Lines 22-29: new acceleration of each due particle, then its corrected state, which holds from this time on."""
         self.momentum.sum.visit(self.advance, due, now, tick)
@@ -168,39 +157,50 @@ class Motion:
     @ti.func
     def advance(self, k, fluid, by_walls, due: ti.template(), now, tick):
         """The same for the particle at place `k`, given the shares of the fluid and of the walls in its rates."""
-        i = self.grid.order[k]
+        p, i = self.particles, self.grid.order[k]
         present = now + due.read_at[self.grid.block(i)]
         dt = self.elapsed(i, present, tick)
-        a = self.particles.a[i]
+        a = p.a[i]
         rates = self.momentum.other_rates(k, fluid, present, tick) + by_walls
-        a_new = a
-        for d in ti.static(range(self.particles.dim)):
+        a_new, power = a, 0.0  # [W/kg]
+        for d in ti.static(range(p.dim)):
             a_new[d] = rates[d]
-        if ti.static(self.particles.has_rho_rate):
-            self.particles.rho_rate[i] = rates[self.particles.dim]
-        if ti.static(self.integrates_density):
-            diffusion = rates[self.particles.dim + 1]
-            self.particles.rho[i] += (0.5 * dt) * (diffusion - self.particles.diffusion[i])
-            self.particles.diffusion[i] = diffusion
-            self.particles.rho_rate[i] += diffusion
-        power = 0.0  # [W/kg]
-        if ti.static(self.particles.has_budget and len(self.moving_walls) > 0):
-            power = self.momentum.wall_power(k)[0]
-        if ti.static(self.particles.has_guide):
-            if present < self.particles.guided_until[i]:
-                power = -a_new.dot(self.particles.v[i])
+        self.formulation.keep_rates(i, rates, dt)
+        for books in ti.static(self.books):
+            power = books.power(k)
+        for guide in ti.static(self.guides):
+            if guide.leads(i, present):
+                power = -a_new.dot(p.v[i])
                 a_new = ti.zero(a)
         x = self.integrator.correct_position(self.near.x[k], a, a_new, dt)
-        v = self.integrator.correct_velocity(self.particles.v[i], a, a_new, dt)
+        v = self.integrator.correct_velocity(p.v[i], a, a_new, dt)
         v, a_new = self.limit(v, self.largest_speed), self.limit(a_new, self.largest_acceleration)
-        finite = True  # also of the values given: a position that is NaN has been clamped to a corner by now
+        self.count_broken(
+            p.x[i] + v + a_new
+        )  # also what was given: a position that is NaN has been clamped to a corner by now
+        v_free = v
+        x, v = self.confine(x, v, present, tick)
+        for books in ti.static(self.books):
+            books.keep(i, dt, by_walls, v_free, v, power)
+        for past in ti.static(self.past):
+            past.keep(i, x)
+        p.x[i], p.v[i], p.a[i] = x, v, a_new
+        p.updated[i] = present
+        due.evaluated(i, a_new, tick)
+
+    @ti.func
+    def count_broken(self, state):
+        """Count a `state` with an entry that is not finite."""
+        finite = True
         for d in ti.static(range(self.particles.dim)):
-            total = self.particles.x[i][d] + v[d] + a_new[d]
-            finite = finite and not (ti.math.isnan(total) or ti.math.isinf(total))
+            finite = finite and not (ti.math.isnan(state[d]) or ti.math.isinf(state[d]))
         if not finite:
             self.not_finite.add(0, 1)
-        inside = self.geometry.place(x)
-        v_free, v_face = v, ti.zero(v)
+
+    @ti.func
+    def confine(self, x, v, present, tick):
+        """Keep a centre at `x` [m] inside the domain and outside obstacles, and take from `v` [m/s] what leads there."""
+        inside, v_face = self.geometry.place(x), ti.zero(v)
         for wall in ti.static(self.faces):
             held = wall.hold(inside, present, tick)
             if held[wall.axis] != inside[wall.axis]:
@@ -218,27 +218,7 @@ class Motion:
                 self.stopped_by_obstacles.add(0, 1)
                 inside = self.geometry.place(held)
                 v -= ti.min((v - v_surface).dot(normal), 0.0) * normal
-        if ti.static(self.particles.has_budget):
-            a_walls = a
-            for d in ti.static(range(self.particles.dim)):
-                a_walls[d] = by_walls[d]
-            if ti.static(self.particles.has_past):
-                self.particles.past_wall_push[i] = self.particles.wall_push[i]
-            self.particles.wall_push[i] += (0.5 * dt) * (self.particles.a_walls[i] + a_walls) + v - v_free
-            self.particles.a_walls[i] = a_walls
-            self.particles.work[i] += (0.5 * dt) * (self.particles.power[i] + power)
-            self.particles.power[i] = power
-        if ti.static(self.particles.has_past):
-            self.particles.past_x[i] = self.particles.x[i]
-            if ti.static(self.geometry.repeats):  # the image that lies beside the new position
-                self.particles.past_x[i] = inside - self.geometry.difference(inside, self.particles.x[i])
-            self.particles.past_v[i] = self.particles.v[i]
-            self.particles.past_updated[i] = self.particles.updated[i]
-        self.particles.x[i] = inside
-        self.particles.v[i] = v
-        self.particles.a[i] = a_new
-        self.particles.updated[i] = present
-        due.evaluated(i, a_new, tick)
+        return inside, v
 
     @ti.kernel
     def export(
@@ -265,7 +245,7 @@ class Motion:
                 held, _normal, _velocity = obstacle.hold(position, now, tick, ahead)
                 position = held
             velocity = self.particles.v[i] + self.particles.a[i] * dt
-            if ti.static(self.particles.has_past):
+            if ti.static(len(self.past) > 0):
                 velocity = self.velocity(i, dt, tick)
             identity = self.particles.identity[i]
             for d in ti.static(range(self.particles.dim)):
@@ -273,7 +253,7 @@ class Motion:
                 v[identity, d] = velocity[d]
                 a[identity, d] = self.particles.a[i][d]
             rho[identity] = self.particles.rho[i]
-            if ti.static(self.particles.has_past):
+            if ti.static(len(self.past) > 0):
                 rho[identity] = self.density(i, dt, tick)
             level[identity] = self.particles.level[i]
             updated[identity] = self.particles.updated[i]

@@ -1,5 +1,8 @@
 """Fluid that flows out: particles in an outlet's box are removed from the particles' fields."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from taichi_rts.device.backend import ti
@@ -7,12 +10,13 @@ from taichi_rts.device.scan import ExclusiveScan
 from taichi_rts.medium.energy import potential_of
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.motion.motion import Motion
+from taichi_rts.solver.particles.extra import Extra
 
 EVERY = 4  # sorts between two checks, each of which the host waits for: fluid at Mach 0.1 moves 0.16 r meanwhile
 
 
 @ti.data_oriented
-class Outlets:
+class Outlets(Extra):
     """Takes out the particles that are in an outlet, before the grid is sorted; their ids are not given again.
 
     Those that stay keep their order in memory, and what an inflow has yet to bring follows them: entries of particles that are
@@ -39,6 +43,29 @@ class Outlets:
         self.place = ti.field(ti.i32, self.particles.capacity + 1)
         self.scan = ExclusiveScan(self.stays, self.place)
         self.found = ti.field(ti.i32, ())
+
+    def before_sort(self, now: int, tick: float, before_change: Callable[[], object]) -> None:
+        """Take out what is in an outlet at tick `now`."""
+        if leaving := self.find(now, tick):
+            before_change()
+            self.take_out(leaving, now, tick)
+
+    def statistics(self) -> dict[str, Any]:
+        """How many particles each outlet has taken out."""
+        return {"removed_by_outlets": list(self.removed)}
+
+    def energy_brought(self) -> float:
+        """The energy [J] taken out, less than nothing, and the work that had been done on it, which went out with it."""
+        return self.work - self.energy
+
+    def kept(self, tick: float) -> Any:
+        """How many particles each outlet has taken out, their energy and the work done on them."""
+        return tuple(self.removed), self.energy, self.work
+
+    def go_on(self, kept: Any, now: int, tick: float) -> None:
+        """Go on from there."""
+        removed, self.energy, self.work = kept
+        self.removed, self.looks = list(removed), 0
 
     def find(self, now: int, tick: float) -> int:
         """Return how many particles are in an outlet at tick `now`; only every `EVERY`-th call looks, others return 0."""

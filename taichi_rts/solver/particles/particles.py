@@ -126,6 +126,12 @@ class FluidState:
         ordered[identity] = values
         return ordered if self.count == self.born else ordered[np.sort(identity)]
 
+    def put(self, field: ti.Field, values: Any, rest: float = 0) -> None:
+        """Set a field's first entries, those that hold particles, to `values`, (count, ...), and the others to `rest`."""
+        whole = field.to_numpy()
+        whole[: self.count], whole[self.count :] = values, rest
+        field.from_numpy(whole)
+
     def ids(self) -> np.ndarray:
         """Ids of the particles that are there, (N,), ascending."""
         return np.sort(self.identity.to_numpy()[: self.count])

@@ -61,6 +61,16 @@ class ContinuityDensity(Density):
         """Density at the end of the step."""
         return self.particles.rho[i] + self.near.elapsed[k] * (total + self.particles.diffusion[i])
 
+    @ti.func
+    def keep_rates(self, i, rates, dt):
+        """Take the rate of the density and correct its diffusion over the step of `dt` [s]."""
+        p = self.particles
+        p.rho_rate[i] = rates[p.dim]
+        diffusion = rates[p.dim + 1]
+        p.rho[i] += (0.5 * dt) * (diffusion - p.diffusion[i])
+        p.diffusion[i] = diffusion
+        p.rho_rate[i] += diffusion
+
 
 def rise_of_pressure(scene: Scene) -> tuple[float, ...]:
     """-g/rho_0 [m^4/(kg s^2)], (dim,): how p/rho_0^2 rises in water at rest; 0 where gravity changes."""

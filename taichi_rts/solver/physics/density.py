@@ -10,6 +10,7 @@ from taichi_rts.solver.grid.neighbour_sum import NeighbourSum
 from taichi_rts.solver.grid.windows import FluidWindows
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
 from taichi_rts.solver.particles.particles import FluidState
+from taichi_rts.solver.particles.past import Past
 
 
 @ti.data_oriented
@@ -33,12 +34,13 @@ class Density:
         walls: Sequence[Any],
         medium: Medium,
         backend: Backend,
+        past: Sequence[Past] = (),
     ) -> None:
         self.particles = particles
         self.near = near
         self.grid = grid
         self.equation_of_state = medium.equation_of_state
-        self.keeps_past = particles.has_past
+        self.past = list(past)
         fluid_pair, wall_pair = self.pairs(medium)
         self.sum = NeighbourSum(
             fluid_pair, wall_pair, 1, self.reads, ("x", "volume"), near, grid, windows, walls, backend
@@ -66,11 +68,17 @@ class Density:
         present = now + due.read_at[self.grid.block(i)]
         elapsed = ti.cast(present - self.particles.updated[i], float) * tick
         self.equation_of_state.adapt(i, self.grid.block(i), rho, elapsed)
-        if ti.static(self.keeps_past):
-            self.particles.past_rho[i] = self.particles.rho[i]
+        for past in ti.static(self.past):
+            past.keep_density(i)
         self.near.rho[k] = rho
         self.near.p_over_rho2[k] = self.equation_of_state.pressure_of(i, rho) / (rho * rho)
         self.particles.rho[i] = rho
+
+    @ti.func
+    def keep_rates(self, i, rates, dt):
+        """Take what its `rates` say of the density of particle `i`, at the end of a step of `dt` [s]."""
+        if ti.static(self.particles.has_rho_rate):
+            self.particles.rho_rate[i] = rates[self.particles.dim]
 
 
 @ti.data_oriented

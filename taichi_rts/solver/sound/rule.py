@@ -7,6 +7,7 @@ from taichi_rts.medium.equation_of_state import tait
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.grid.surroundings import Surroundings
+from taichi_rts.solver.particles.extra import Extra
 from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.limits import BlockMaxima
@@ -22,7 +23,7 @@ Kinetic energy after 2 s over that with one sound speed: 15 times without slack,
 
 
 @ti.data_oriented
-class SoundRule:
+class SoundRule(Extra):
     """c_b = max(|v|, sqrt(<p>/rho_0)) / mach over the block and those around it, and at least half of a neighbour's.
 
     Why: density then varies by mach^2 (1 %) everywhere, as it does in the whole with one sound speed of ten times the largest
@@ -78,6 +79,26 @@ class SoundRule:
         pool of 1 m has four to ten times the energy after 20 s.
         """
         self.work_out(read_at, now, tick)
+
+    def before_regions(self, schedule: Any, now: int, tick: float) -> None:
+        """Work out the targets, unless the schedule does it for the blocks that step."""
+        if schedule.needs_sound:
+            self.update(schedule.read_at, now, tick)
+
+    def kept(self, tick: float) -> Any:
+        """Sound speeds [m/s] and reference densities [kg/m^3], (N,) each, by id."""
+        p = self.particles
+        return p.to_numpy(p.sound), p.to_numpy(p.reference)
+
+    def go_on(self, kept: Any, now: int, tick: float) -> None:
+        """Go on from there; every target is worked out anew."""
+        p = self.particles
+        for field in vars(self).values():
+            if isinstance(field, ti.Field):
+                field.fill(0)
+        sound, reference = kept or (self.floor, self.rest_density)
+        p.put(p.sound, sound, self.floor)
+        p.put(p.reference, reference, self.rest_density)
 
     def update_some(self, cells: Any, tick: float) -> None:
         """Do the same for the cells that have just stepped (`cells.Cells`), each at its own time, and those beside."""

@@ -9,7 +9,9 @@ import pytest
 
 import taichi_rts as rts
 from taichi_rts.commands.main import main, parse_demo
-from taichi_rts.commands.run import STEPPER_OPTIONS, Run
+from taichi_rts.commands.options import StepperOptions
+from taichi_rts.commands.run import Run
+from taichi_rts.output.options import replaced
 from taichi_rts.output.panels import LAYOUTS, Panel
 
 pytestmark = pytest.mark.usefixtures("quick_environment")
@@ -129,33 +131,33 @@ def test_a_window_takes_what_demos_set_and_what_it_can_obey(monkeypatch):
 
 
 def parse(*args):
-    return parse_demo(Run(scene="double_dam_break", preset="paper", export_fps=20.0), list(args))
+    return parse_demo(replaced(Run(), {"scene": "double_dam_break", "preset": "paper", "export_fps": 20.0}), list(args))
 
 
 def test_a_demos_preset_holds_for_its_own_stepper_only():
-    assert parse().make_stepper() == rts.Regional(preset="paper")
-    assert parse("--levels", "4").make_stepper() == rts.Regional(preset="paper", levels=4)
+    assert parse().stepping.make() == rts.Regional(preset="paper")
+    assert parse("--levels", "4").stepping.make() == rts.Regional(preset="paper", levels=4)
     other = parse("--stepper", "asynchronous", "--levels", "16", "--courant", "0.8")
-    assert other.make_stepper() == rts.Asynchronous(levels=16, courant=0.8)
-    assert other.export_fps == 20.0
-    assert parse("--stepper", "uniform").make_stepper() == rts.Uniform()
+    assert other.stepping.make() == rts.Asynchronous(levels=16, courant=0.8)
+    assert other.files.export_fps == 20.0
+    assert parse("--stepper", "uniform").stepping.make() == rts.Uniform()
     with pytest.raises(rts.StepperError, match="--preset does not belong to the asynchronous stepper"):
-        parse("--stepper", "asynchronous", "--preset", "paper").make_stepper()
+        parse("--stepper", "asynchronous", "--preset", "paper").stepping.make()
 
 
 def test_every_option_of_the_asynchronous_stepper_can_be_given():
     args = ["--steps", "integers", "--limiter", "False", "--stagger", "7", "--levels", "6", "--lambda-f", "0.1"]
     args += ["--courant", "0.8", "--inactive-density", "stale"]
     wanted = rts.Asynchronous(0.8, 6, "integers", 0.1, limiter=False, inactive_density="stale", stagger=7)
-    assert parse("--stepper", "asynchronous", *args).make_stepper() == wanted
-    assert parse("--limiter", "True").make_stepper() == rts.Regional(preset="paper", limiter=True)
-    assert {field.name for field in dataclasses.fields(rts.Asynchronous)} <= set(STEPPER_OPTIONS)
+    assert parse("--stepper", "asynchronous", *args).stepping.make() == wanted
+    assert parse("--limiter", "True").stepping.make() == rts.Regional(preset="paper", limiter=True)
+    assert {field.name for field in dataclasses.fields(rts.Asynchronous)} <= set(vars(StepperOptions()))
 
 
 def test_panels_have_their_own_steppers():
     def panels(scene, *args):
         run = parse(*args)
-        return run.make_panels(scene, run.make_stepper())
+        return run.make_panels(scene, run.stepping.make())
 
     assert panels("dam_break", "--panels", "steppers") == LAYOUTS["steppers"]
     assert [panel.stepper.name for panel in LAYOUTS["steppers"]] == ["uniform", "regional", "asynchronous"]
