@@ -3,6 +3,7 @@
 import numpy as np
 
 from taichi_rts.device.backend import ti
+from taichi_rts.device.fields import Declared, Part, integers, within
 from taichi_rts.device.scan import ExclusiveScan
 from taichi_rts.medium.energy import potential_of
 from taichi_rts.scene.scene import Scene
@@ -12,7 +13,7 @@ EVERY = 4  # sorts between two checks, each of which the host waits for: fluid a
 
 
 @ti.data_oriented
-class Outlets:
+class Outlets(Part):
     """Takes out the particles that are in an outlet, before the grid is sorted; their ids are not given again.
 
     Those that stay keep their order in memory, and what an inflow has yet to bring follows them: entries of particles that are
@@ -35,10 +36,15 @@ class Outlets:
         self.work = 0.0
         """Work [J] that moving walls and inflows had done on it."""
         self.looks = 0
-        self.stays = ti.field(ti.i32, self.particles.capacity)
-        self.place = ti.field(ti.i32, self.particles.capacity + 1)
+        self.make_fields(self.fields(self.particles.capacity))
         self.scan = ExclusiveScan(self.stays, self.place)
         self.found = ti.field(ti.i32, ())
+
+    @staticmethod
+    def fields(capacity: int) -> list[Declared]:
+        """Declare the fields for `capacity` particles."""
+        own = [*integers(capacity, "stays"), *integers(capacity + 1, "place")]
+        return own + within("scan", ExclusiveScan.fields(capacity))
 
     def find(self, now: int, tick: float) -> int:
         """Return how many particles are in an outlet at tick `now`; only every `EVERY`-th call looks, others return 0."""
