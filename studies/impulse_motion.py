@@ -11,9 +11,10 @@ import contextlib
 from taichi_rts.assembly import build as simulation
 from taichi_rts.device import backend as backends
 from taichi_rts.device.backend import ti
+from taichi_rts.device.fields import vector_field
 from taichi_rts.solver.grid.sums import make_neighbour_sum, make_wall_sum
 from taichi_rts.solver.motion.motion import Motion
-from taichi_rts.solver.particles.fields import components, vector_field
+from taichi_rts.solver.particles.fields import components
 from taichi_rts.solver.physics.viscosity import viscosity_terms
 from taichi_rts.solver.stepping.base import Schedule
 

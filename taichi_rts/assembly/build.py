@@ -45,7 +45,7 @@ def assemble(
 ) -> Solver:
     """Build the parts of a run of `scene`, whose coordinates are counted from its origin, from its particles at the `start`.
 
-    `own` are the forces of a user's own.
+    `own` are the forces of a user's own. `memory.declared_fields` lists the fields of all parts that are made here.
     """
     timeline = stepper.timeline(scene)
     needs = optional_fields(scene, stepper, debug)
@@ -119,10 +119,13 @@ def make_particles(scene: Scene, start: Sample, backend: Backend, needs: frozens
     return particles
 
 
-def make_geometry(scene: Scene, stepper: Stepper) -> Geometry:
-    """Return the blocks of the domain, wider than the support by what particles drift until the next sort."""
-    drift = stepper.drift * scene.support
-    return Geometry(scene.domain.lower, scene.domain.upper, scene.support, drift, scene.is_periodic)
+def make_geometry(scene: Scene, stepper: Stepper, support: float | None = None) -> Geometry:
+    """Return the blocks of the domain, wider than the support by what particles drift until the next sort.
+
+    `support` [m] is the scene's, or that of another spacing.
+    """
+    support = support or scene.support
+    return Geometry(scene.domain.lower, scene.domain.upper, support, stepper.drift * support, scene.is_periodic)
 
 
 def make_medium(scene: Scene, start: Sample, particles: FluidState, sound: SoundRule | None) -> Medium:

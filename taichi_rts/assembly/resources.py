@@ -9,35 +9,18 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from taichi_rts.assembly.memory import buffer_bytes, device_bytes, host_bytes
 from taichi_rts.device.backend import Backend, has_vulkan_hardware
-from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.errors import ResourceError
-from taichi_rts.scene.checks.size import finest_spacing, size_of
-from taichi_rts.scene.obstacles.making import make_solid
-from taichi_rts.scene.obstacles.solid import grid_nodes
+from taichi_rts.scene.checks.size import finest_spacing
 from taichi_rts.scene.placing import origin_of, translated
-from taichi_rts.solver.grid import resorting
-from taichi_rts.solver.grid.windows import entries, room
 from taichi_rts.solver.stepping.timeline import MAX_TICKS
 
 if TYPE_CHECKING:
     from taichi_rts.scene.scene import Scene
 
-INTEGER = 4  # bytes
-SAMPLING = 50
-"""Bytes of the host per particle and dimension while a scene is sampled, at most (measured: 49 in two and three dimensions)."""
-TABULATING = 100
-"""Bytes of the host per node of an obstacle's table of distances while that is filled."""
-LINING = 10 * SAMPLING
-"""Bytes of the host per boundary particle of an obstacle and dimension: they are chosen from about ten times as many points."""
 COMPILED = 400 << 20
 """Bytes that Python, the compiler and compiled kernels take in addition."""
-FIXED = 1 << 14
-"""Bytes of fields whose size does not depend on the scene, about."""
-WALL_SHARE = 0.45
-"""Entries of the windows on a wall at rest over those of the windows on the fluid at r = 2s, about."""
-SOUND_REALS = 9
-"""Fields of reals with an entry for each block that a regional sound speed needs."""
 MOST_ADDRESSED = 2**32 - 1
 """Bytes of one buffer on Vulkan and Metal, at most: kernels in SPIR-V compute 32-bit addresses, which wrap round beyond
 that.
@@ -49,93 +32,6 @@ SINGLE, DOUBLE = 2.0**-24, 2.0**-53
 FINEST_POSITION = 0.001
 """Share of the spacing by which positions may be rounded: a still pool then moves half as fast again
 (docs/evidence/reliability.md)."""
-
-
-def device_bytes(
-    scene: Scene,
-    stepper: Any,
-    precision: str,
-    *,
-    debug: bool = False,
-    spacing: float | None = None,
-    on_cpu: bool = True,
-) -> float:
-    """Bytes of all fields of a `Simulation`: what its parts allocate for each particle, wall particle, cell and block."""
-    return sum(buffer_bytes(scene, stepper, precision, debug=debug, spacing=spacing, on_cpu=on_cpu).values())
-
-
-def buffer_bytes(
-    scene: Scene,
-    stepper: Any,
-    precision: str,
-    *,
-    debug: bool = False,
-    spacing: float | None = None,
-    on_cpu: bool = False,
-) -> dict[str, float]:
-    """Bytes of the fields that a `Simulation` makes one after the other, of which none launches a kernel in between, or more."""
-    size, dim, real = size_of(scene, spacing), scene.dim, 8 if precision == "f64" else 4
-    regional = scene.with_sound_for(stepper).regional_sound is not None
-    integrated = scene.density == "continuity"
-    faces, turning = len(scene.moving_walls), sum(body.motion is not None for body in scene.obstacles)
-    pose = 2 * dim + dim * dim + (1 if dim == 2 else 3)
-    viscous = len(set(scene.viscosities)) > 1
-    # Reals and integers of `FluidState`.
-    reals, integers = 3 * dim + 1, 3 + 1 + bool(scene.inflows)
-    reals += 1 if stepper.extrapolates_density or integrated else 0
-    reals += 1 if integrated else 0
-    reals += 2 * dim + 1 if stepper.keeps_past else 0
-    reals += 1 if viscous else 0
-    reals += 2 if regional else 0
-    reals += 3 * dim + 3 if debug else 0
-    near = 2 * dim + 2 + (dim + 1) * integrated + viscous
-    per_block = INTEGER * (2 * CELLS_PER_BLOCK + (1 if on_cpu else 3)) + real * SOUND_REALS * regional
-    walls_per_block = INTEGER * (CELLS_PER_BLOCK + 1) * (1 + faces) + real * pose * turning
-    steps_per_block = INTEGER * stepper.block_integers
-    nodes = sum(_nodes(scene, spacing))
-    windows = entries(room(dim, (scene.support_ratio * (1.0 + 2.0 * stepper.drift)) ** dim))
-    wall_reals = 2 * dim + 1 + (scene.wall_planes > 1)
-    share = WALL_SHARE * scene.wall_planes * 2.0 / scene.support_ratio
-    reals_seen = near + (share * wall_reals if scene.walls and not scene.periodic else 0.0)
-    return {
-        "the particles' state": size.particles * (real * reals + INTEGER * integers),
-        "the particles' order": size.particles * INTEGER * 3,
-        "the grid and what neighbours see": size.particles * real * near
-        + size.blocks * per_block
-        + (windows * real * reals_seen + INTEGER * resorting.integers(size.particles, size.blocks) if on_cpu else 0.0),
-        "walls": (size.walls + _lining(scene, spacing)) * real * wall_reals
-        + size.particles * real * 2 * faces
-        + size.blocks * walls_per_block,
-        "the distances from obstacles": nodes * real,
-        "steps": size.particles * INTEGER * 2 + size.blocks * steps_per_block + FIXED,
-    }
-
-
-def host_bytes(scene: Scene, *, spacing: float | None = None) -> float:
-    """Largest number of bytes that sampling takes on the host; the arrays of a frame need less."""
-    size = size_of(scene, spacing)
-    obstacles = _lining(scene, spacing) * scene.dim * LINING + max(_nodes(scene, spacing), default=0.0) * TABULATING
-    return (size.particles + size.walls) * scene.dim * SAMPLING + obstacles
-
-
-def _nodes(scene: Scene, spacing: float | None) -> list[float]:
-    """Number of nodes of each obstacle's table of distances."""
-    found = []
-    for obstacle in scene.obstacles:
-        solid = make_solid(obstacle, scene.spacing, scene.domain)
-        _origin, shape, _step = grid_nodes(solid.lower, solid.upper, spacing or scene.spacing)
-        found.append(math.prod(map(float, shape)))
-    return found
-
-
-def _lining(scene: Scene, spacing: float | None) -> float:
-    """Number of boundary particles of all obstacles: that of their bounding boxes."""
-    s, total = spacing or scene.spacing, 0.0
-    for obstacle in scene.obstacles:
-        solid = make_solid(obstacle, scene.spacing, scene.domain)
-        sides = [length / s + 1.0 for length in solid.upper - solid.lower]
-        total += sum(2.0 * math.prod(sides[:d] + sides[d + 1 :]) for d in range(scene.dim))
-    return total * scene.wall_planes
 
 
 def free_host_memory() -> float:

@@ -5,10 +5,11 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.device.backend import ti
+from taichi_rts.device.fields import Declared, Part
 
 
 @ti.data_oriented
-class Counters:
+class Counters(Part):
     """Counts of up to 2^64 - 1, each in two fields of 32 bits: its lower half, and how often that has run over.
 
     With `alone` no two threads ever add to the same entry, so that additions need not be atomic.
@@ -16,7 +17,12 @@ class Counters:
 
     def __init__(self, count: int = 1, *, alone: bool = False) -> None:
         self.alone = alone
-        self.low, self.high = (ti.field(ti.u32, count) for _ in range(2))
+        self.make_fields(self.fields(count))
+
+    @staticmethod
+    def fields(count: int = 1) -> list[Declared]:
+        """Declare the fields of `count` counts."""
+        return [Declared(name, ti.u32, count) for name in ("low", "high")]
 
     @ti.func
     def add(self, entry, count):

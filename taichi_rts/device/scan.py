@@ -3,10 +3,11 @@
 import math
 
 from taichi_rts.device.backend import ti
+from taichi_rts.device.fields import Declared, Part, integers
 
 
 @ti.data_oriented
-class ExclusiveScan:
+class ExclusiveScan(Part):
     """Turns counts into starts: `starts[k] = sum(counts[:k])`, `starts[n]` and `total[None]` the sum of all.
 
     Two levels of about sqrt(n) entries: chunks in parallel, one thread over the chunks' sums, chunks in parallel.
@@ -20,10 +21,20 @@ class ExclusiveScan:
             raise ValueError(f"starts has {starts.shape[0]} entries; counts has {self.n}, so it needs {self.n + 1}")
         self.counts = counts
         self.starts = starts
-        self.chunk = max(32, math.isqrt(self.n) + 1)
+        self.chunk = self.chunk_of(self.n)
         self.chunks = -(-self.n // self.chunk)
-        self.sums = ti.field(ti.i32, self.chunks)
+        self.make_fields(self.fields(self.n))
         self.total = ti.field(ti.i32, ())
+
+    @staticmethod
+    def chunk_of(n: int) -> int:
+        """Return the length of a chunk of `n` counts."""
+        return max(32, math.isqrt(n) + 1)
+
+    @classmethod
+    def fields(cls, n: int) -> list[Declared]:
+        """Declare the fields for `n` counts, without these and their starts."""
+        return integers(-(-n // cls.chunk_of(n)), "sums")
 
     def run(self) -> None:
         """Fill `starts` and `total` from `counts`."""

@@ -8,13 +8,14 @@ import numpy as np
 
 from taichi_rts.device.backend import on_cpu, ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
+from taichi_rts.device.fields import Declared, Part, integers, within
 from taichi_rts.device.scan import ExclusiveScan
 from taichi_rts.solver.grid.geometry import Geometry
 from taichi_rts.solver.grid.resorting import Resorting
 
 
 @ti.data_oriented
-class BlockGrid:
+class BlockGrid(Part):
     """Sorts the `alive[None]` first of up to `count` particles (all, if `alive` is None) into cells.
 
     `order[k]` is the particle at place k; cell c holds places `start[c] .. start[c+1]`. `occupied` lists the blocks that hold
@@ -46,25 +47,44 @@ class BlockGrid:
         self.alive = ti.field(ti.i32, ()) if alive is None else alive
         if alive is None:
             self.alive[None] = count
-        self.cell_of = ti.field(ti.i32, count)
-        self.cell_of.fill(-1)
-        self.rank = ti.field(ti.i32, count)
-        self.order = ti.field(ti.i32, count)
-        self.order.from_numpy(np.arange(count, dtype=np.int32))
-        self.cell_count = ti.field(ti.i32, geometry.cells)
-        self.start = ti.field(ti.i32, geometry.cells + 1)
-        self.occupied = ti.field(ti.i32, geometry.blocks)
         self.serial = on_cpu()
+        self.make_fields(self.order_fields(count))
+        self.cell_of.fill(-1)
+        self.order.from_numpy(np.arange(count, dtype=np.int32))
+        self.make_fields(self.block_fields(count, geometry.blocks, serial=self.serial))
         if self.serial:
             self.resorting = Resorting(self, count)
             self.occupied_count = ti.field(ti.i32, ())
         else:
             self.scan = ExclusiveScan(self.cell_count, self.start)
-            self.occupied_flag = ti.field(ti.i32, geometry.blocks)
-            self.occupied_start = ti.field(ti.i32, geometry.blocks + 1)
             self.occupied_scan = ExclusiveScan(self.occupied_flag, self.occupied_start)
             self.occupied_count = self.occupied_scan.total
         self.tracks_arrivals = self.tracks_vacated = False
+
+    @staticmethod
+    def order_fields(count: int) -> list[Declared]:
+        """Declare the fields with an entry for each of `count` particles."""
+        return integers(count, "cell_of", "rank", "order")
+
+    @staticmethod
+    def block_fields(count: int, blocks: int, *, serial: bool) -> list[Declared]:
+        """Declare the other fields for `count` particles in `blocks` blocks; `serial`: on a CPU."""
+        cells = blocks * CELLS_PER_BLOCK
+        declared = [*integers(cells, "cell_count"), *integers(cells + 1, "start"), *integers(blocks, "occupied")]
+        if serial:
+            return declared + within("resorting", Resorting.fields(count, blocks))
+        scans = within("scan", ExclusiveScan.fields(cells)) + within("occupied_scan", ExclusiveScan.fields(blocks))
+        return [*declared, *integers(blocks, "occupied_flag"), *integers(blocks + 1, "occupied_start"), *scans]
+
+    @staticmethod
+    def arrival_fields(blocks: int) -> list[Declared]:
+        """Declare what `track_arrivals` makes."""
+        return integers(blocks, "arrived")
+
+    @staticmethod
+    def vacated_fields(blocks: int) -> list[Declared]:
+        """Declare what `track_vacated` makes."""
+        return integers(blocks, "vacated")
 
     def track_arrivals(self) -> None:
         """From now on note in `arrived`, (blocks,), by a 1 which blocks a particle has come into; readers reset it.
@@ -73,7 +93,7 @@ class BlockGrid:
         first sort.
         """
         self.tracks_arrivals = True
-        self.arrived = ti.field(ti.i32, self.geometry.blocks)
+        self.make_fields(self.arrival_fields(self.geometry.blocks))
 
     def track_vacated(self) -> None:
         """From now on list in `vacated` the `vacated_count[None]` blocks that have become empty since the last update.
@@ -82,7 +102,7 @@ class BlockGrid:
         """
         if not self.tracks_vacated:
             self.tracks_vacated = True
-            self.vacated = ti.field(ti.i32, self.geometry.blocks)
+            self.make_fields(self.vacated_fields(self.geometry.blocks))
             self.vacated_count = ti.field(ti.i32, ())
 
     def forget(self) -> None:

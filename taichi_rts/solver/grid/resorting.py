@@ -1,9 +1,9 @@
 """Keeps the particles of a `BlockGrid` sorted on a CPU: those that changed their cell are merged into the others."""
 
-import math
 from typing import Any
 
 from taichi_rts.device.backend import CHUNK, threads, ti
+from taichi_rts.device.fields import Declared, Part, integers
 
 FEW = 8
 """Only if fewer than one of so many particles have changed their cell there is a list of them; else all are sorted anew."""
@@ -20,13 +20,8 @@ def listed(count: int) -> int:
     return max(1024, count // FEW)
 
 
-def integers(count: float, blocks: float) -> float:
-    """Number of integers that a `Resorting` of so many particles and blocks keeps, about."""
-    return 2 * listed(math.ceil(count)) + 6 * math.ceil(blocks / blocks_in_part(math.floor(blocks)))
-
-
 @ti.data_oriented
-class Resorting:
+class Resorting(Part):
     """What a counting sort gives, from what the last one gave: most particles stay in their cell from step to step.
 
     The blocks are divided into `parts` of equally many. A part that no particle has left or come into keeps its order;
@@ -46,18 +41,23 @@ class Resorting:
         self.blocks_each = blocks_in_part(self.blocks)
         self.parts = -(-self.blocks // self.blocks_each)
         self.room = listed(count)
-        self.moved = ti.field(ti.i32, self.room)
-        self.following = ti.field(ti.i32, self.room)
+        self.make_fields(self.fields(count, self.blocks))
         self.moved_count = ti.field(ti.i32, ())
         self.all_anew = ti.field(ti.i32, ())
-        self.touched = ti.field(ti.i32, self.parts)
-        self.growth = ti.field(ti.i32, self.parts)
-        """How many particles have come into each part, minus those that have left it."""
-        self.old_first = ti.field(ti.i32, self.parts + 1)
-        self.new_first = ti.field(ti.i32, self.parts + 1)
-        self.occupied_in = ti.field(ti.i32, self.parts)
-        """Number of occupied blocks of each part."""
-        self.first_occupied = ti.field(ti.i32, self.parts)
+
+    @staticmethod
+    def fields(count: int, blocks: int) -> list[Declared]:
+        """Declare the fields for `count` particles in `blocks` blocks.
+
+        `growth` is how many particles have come into each part, minus those that have left it; `occupied_in` is its number of
+        occupied blocks.
+        """
+        parts = -(-blocks // blocks_in_part(blocks))
+        return [
+            *integers(listed(count), "moved", "following"),
+            *integers(parts, "touched", "growth", "occupied_in", "first_occupied"),
+            *integers(parts + 1, "old_first", "new_first"),
+        ]
 
     def restored(self) -> None:
         """Take note that the order is that of another time: look at all parts at the next update."""

@@ -14,12 +14,14 @@ import numpy as np
 
 from taichi_rts.device.backend import Backend, threads, ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
+from taichi_rts.device.fields import Declared, Part, integers, within
 from taichi_rts.solver.grid.geometry import MARGIN, Geometry
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.particles.fields import components
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
 
 RUN = 16  # most blocks that share a window
+COLUMNS = (RUN + 2) * CELLS_PER_BLOCK + 1  # of cells of a window, and one that ends the last
 VECTOR = 32
 """Loops run to a multiple of it, or LLVM leaves a scalar remainder; the padding there is too far away to count."""
 ROOM = 1.5  # of a window, over what lies around a run of blocks at rest
@@ -48,7 +50,7 @@ def entries(capacity: int) -> int:
 
 
 @ti.data_oriented
-class Windows:
+class Windows(Part):
     """A window for every thread on what `start` has sorted into cells; each has room for `capacity` entries.
 
     One for every thread, not for every task, because it then stays in that core's cache.
@@ -70,12 +72,14 @@ class Windows:
         self.capacity = capacity
         self.size = capacity + VECTOR
         self.entries = entries(capacity)
-        self.columns = (RUN + 2) * CELLS_PER_BLOCK + 1
-        self.column_start = ti.field(ti.i32, threads() * self.columns)
-        """First entry of each column of a window; the next one's ends it."""
-        self.own_start = ti.field(ti.i32, threads() * self.columns)
-        """First entry of those in the run's own row."""
+        self.columns = COLUMNS
+        self.make_fields(self.column_fields())
         self.far = geometry.upper[0] + FAR * geometry.reach
+
+    @staticmethod
+    def column_fields() -> list[Declared]:
+        """Declare the first entry of each column of a window, which ends that before it, and of those in the run's own row."""
+        return integers(threads() * COLUMNS, "column_start", "own_start")
 
     def copies(self, names: Sequence[str], source: Any, copy: Any) -> list[tuple[ti.Field, ti.Field, float, int]]:
         """List field, copy, value of the padding, and axis (-1 if not a position), of each scalar of `names` of two objects."""
@@ -192,6 +196,12 @@ class FluidWindows(Windows):
         self.inside = Neighbourhood(self.entries, dim, backend, needs)
         """Its positions are unrolled along periodic axes."""
 
+    @classmethod
+    def fields(cls, dim: int, capacity: int, padding: int, needs: Any) -> list[Declared]:
+        """Declare the fields of windows with room for `capacity` particles each."""
+        inside = Neighbourhood.fields(entries(capacity), dim, padding, needs)
+        return cls.column_fields() + within("inside", inside)
+
 
 class WallWindows(Windows):
     """Windows on the particles of a wall at rest, `inside`."""
@@ -199,9 +209,19 @@ class WallWindows(Windows):
     transient = frozenset({"inside"})
 
     def __init__(self, wall: Any) -> None:
+        super().__init__(wall.geometry, wall.start, self.capacity_for(wall), 1)
+        self.inside = wall.room_for(self.entries)
+
+    @classmethod
+    def fields(cls, inside: list[Declared]) -> list[Declared]:
+        """Declare the fields of windows `inside` which the wall's particles have these."""
+        return cls.column_fields() + within("inside", inside)
+
+    @staticmethod
+    def capacity_for(wall: Any) -> int:
+        """Return how many particles the longest run of blocks may have around it."""
         geometry = wall.geometry
         counts = np.diff(wall.start.to_numpy()[::CELLS_PER_BLOCK]).reshape(geometry.shape[::-1])
         for axis in range(geometry.dim - 1):
             counts = counts + np.roll(counts, 1, axis) + np.roll(counts, -1, axis)
-        super().__init__(geometry, wall.start, int(counts.max()) * (RUN + 2), 1)
-        self.inside = wall.room_for(self.entries)
+        return int(counts.max()) * (RUN + 2)

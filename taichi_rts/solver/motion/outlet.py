@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.device.backend import ti
+from taichi_rts.device.fields import Declared, Part, integers, within
 from taichi_rts.device.scan import ExclusiveScan
 from taichi_rts.medium.energy import potential_of
 from taichi_rts.scene.scene import Scene
@@ -16,7 +17,7 @@ EVERY = 4  # sorts between two checks, each of which the host waits for: fluid a
 
 
 @ti.data_oriented
-class Outlets(Extra):
+class Outlets(Part, Extra):
     """Takes out the particles that are in an outlet, before the grid is sorted; their ids are not given again.
 
     Those that stay keep their order in memory, and what an inflow has yet to bring follows them: entries of particles that are
@@ -39,10 +40,15 @@ class Outlets(Extra):
         self.work = 0.0
         """Work [J] that moving walls and inflows had done on it."""
         self.looks = 0
-        self.stays = ti.field(ti.i32, self.particles.capacity)
-        self.place = ti.field(ti.i32, self.particles.capacity + 1)
+        self.make_fields(self.fields(self.particles.capacity))
         self.scan = ExclusiveScan(self.stays, self.place)
         self.found = ti.field(ti.i32, ())
+
+    @staticmethod
+    def fields(capacity: int) -> list[Declared]:
+        """Declare the fields for `capacity` particles."""
+        own = [*integers(capacity, "stays"), *integers(capacity + 1, "place")]
+        return own + within("scan", ExclusiveScan.fields(capacity))
 
     def before_sort(self, now: int, tick: float, before_change: Callable[[], object]) -> None:
         """Take out what is in an outlet at tick `now`."""

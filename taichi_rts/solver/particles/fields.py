@@ -1,4 +1,4 @@
-"""Types and shapes of the fields that hold particles."""
+"""Types of the fields that hold particles."""
 
 from typing import Any
 
@@ -6,11 +6,6 @@ from taichi_rts.device.backend import ti
 
 Values: Any = ti.types.ndarray(ndim=1)
 Rows: Any = ti.types.ndarray(ndim=2)
-
-
-def vector_field(dim: int, dtype: Any, count: int) -> ti.MatrixField:
-    """A field of `count` vectors as a struct of arrays: one contiguous array a component."""
-    return ti.Vector.field(dim, dtype, count, layout=ti.Layout.SOA)
 
 
 def components(field: ti.MatrixField) -> list[ti.Field]:

@@ -4,11 +4,12 @@ from collections.abc import Set
 from typing import Any
 
 from taichi_rts.device.backend import Backend, ti
-from taichi_rts.solver.particles.fields import components, vector_field
+from taichi_rts.device.fields import Declared, Part, reals, vectors
+from taichi_rts.solver.particles.fields import components
 
 
 @ti.data_oriented
-class Neighbourhood:
+class Neighbourhood(Part):
     """What pair loops read, in the grid's order: predicted position x and velocity v, density rho, p/rho^2 [m^5/(kg s^2)].
 
     With a periodic `geometry` positions are those of any image. With `needs` "acceleration" also a [m/s^2] of the step that
@@ -26,19 +27,21 @@ class Neighbourhood:
         self.count = count
         self.geometry = geometry
         self.repeats = geometry is not None and geometry.repeats
-        padded = count + backend.lanes
-        self.x = vector_field(dim, backend.dtype, padded)
-        self.v = vector_field(dim, backend.dtype, padded)
-        self.rho = ti.field(backend.dtype, padded)
-        self.p_over_rho2 = ti.field(backend.dtype, padded)
         self.has_acceleration = "acceleration" in needs
         self.has_viscosity = "viscosity" in needs
-        if self.has_acceleration:
-            self.a = vector_field(dim, backend.dtype, padded)
-            self.elapsed = ti.field(backend.dtype, padded)
-        if self.has_viscosity:
-            self.viscosity = ti.field(backend.dtype, padded)
+        self.make_fields(self.fields(count, dim, backend.lanes, needs), backend.dtype)
         self.rho.fill(1.0)
+
+    @staticmethod
+    def fields(count: int, dim: int, padding: int, needs: Set[str]) -> list[Declared]:
+        """Declare the fields for `count` particles and `padding` entries more."""
+        padded = count + padding
+        declared = [*vectors(dim, padded, "x", "v"), *reals(padded, "rho", "p_over_rho2")]
+        if "acceleration" in needs:
+            declared += [*vectors(dim, padded, "a"), *reals(padded, "elapsed")]
+        if "viscosity" in needs:
+            declared += reals(padded, "viscosity")
+        return declared
 
     @property
     def spare(self) -> list[ti.Field]:

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.device.backend import Backend, ti
-from taichi_rts.solver.particles.fields import Rows, Values, batches, components, vector_field
+from taichi_rts.device.fields import Declared, Part, integers, reals, vectors
+from taichi_rts.solver.particles.fields import Rows, Values, batches, components
 
 
 @ti.data_oriented
-class FluidState:
+class FluidState(Part):
     """Struct-of-arrays fields, (capacity,) each; positions x [m], velocities v [m/s], accelerations a [m/s^2], density rho.
 
     The first `alive[None]` entries hold particles; only an inflow leaves room for more. `born` ids have been given so far,
@@ -62,44 +63,39 @@ class FluidState:
         self.has_budget = "budget" in needs
         self.reals: list[ti.Field] = []
         self.integers: list[ti.Field] = []
-
-        def vector() -> ti.MatrixField:
-            field = vector_field(self.dim, backend.dtype, self.capacity)
-            self.reals += components(field)
-            return field
-
-        def scalar() -> ti.Field:
-            self.reals.append(ti.field(backend.dtype, self.capacity))
-            return self.reals[-1]
-
-        def integer() -> ti.Field:
-            self.integers.append(ti.field(ti.i32, self.capacity))
-            return self.integers[-1]
-
-        self.x, self.v, self.a, self.rho = vector(), vector(), vector(), scalar()
-        self.updated, self.level, self.identity = integer(), integer(), integer()
-        if self.has_rho_rate:
-            self.rho_rate = scalar()
-        if self.has_diffusion:
-            self.diffusion = scalar()
-        if self.has_past:
-            self.past_x, self.past_v, self.past_rho, self.past_updated = vector(), vector(), scalar(), integer()
-        if self.has_viscosity:
-            self.viscosity = scalar()
-        if self.has_sound:
-            self.sound, self.reference = scalar(), scalar()
-        if self.has_guide:
-            self.guided_until = integer()
-        if self.has_budget:
-            self.a_walls, self.wall_push, self.work, self.power = vector(), vector(), scalar(), scalar()
-            if self.has_past:
-                self.past_wall_push = vector()
-            if self.has_sound:
-                self.sound_work = scalar()
+        declared = self.fields(self.capacity, self.dim, needs)
+        self.make_fields(declared, backend.dtype)
+        for each in declared:
+            field = getattr(self, each.name)
+            if each.dtype is float:
+                self.reals += components(field) if each.shape else [field]
+            else:
+                self.integers.append(field)
         self.real_scratch: list[ti.Field] = []
         self.integer_scratch: ti.Field = None
         start = (np.ascontiguousarray(each, backend.numpy_dtype) for each in (positions, velocities, densities))
         self.load(*start, rest_density)
+
+    @staticmethod
+    def fields(capacity: int, dim: int, needs: Set[str]) -> list[Declared]:
+        """Declare the fields with an entry for each of `capacity` particles."""
+        n = capacity
+        declared = [*vectors(dim, n, "x", "v", "a"), *reals(n, "rho"), *integers(n, "updated", "level", "identity")]
+        optional = {
+            "rho_rate": reals(n, "rho_rate"),
+            "diffusion": reals(n, "diffusion"),
+            "past": [*vectors(dim, n, "past_x", "past_v"), *reals(n, "past_rho"), *integers(n, "past_updated")],
+            "viscosity": reals(n, "viscosity"),
+            "sound": reals(n, "sound", "reference"),
+            "guided_until": integers(n, "guided_until"),
+            "budget": [
+                *vectors(dim, n, "a_walls", "wall_push"),
+                *reals(n, "work", "power"),
+                *(vectors(dim, n, "past_wall_push") if "past" in needs else []),
+                *(reals(n, "sound_work") if "sound" in needs else []),
+            ],
+        }
+        return declared + [field for need, fields in optional.items() if need in needs for field in fields]
 
     @ti.kernel
     def load(self, x: Rows, v: Rows, rho: Values, rest_density: float):

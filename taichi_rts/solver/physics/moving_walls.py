@@ -3,6 +3,7 @@
 import numpy as np
 
 from taichi_rts.device.backend import Backend, ti
+from taichi_rts.device.fields import Declared, reals
 from taichi_rts.sampling.walls import WallLayer
 from taichi_rts.scene.parts.conditions import MovingWall, face_axis
 from taichi_rts.solver.grid.geometry import Geometry
@@ -33,13 +34,19 @@ class MovingFace(Walls):
         self.at_lower = description.face[1] == "-"
         self.face = (geometry.lower if self.at_lower else geometry.upper)[self.axis]
         times, displacements, velocities = description.times, description.displacements, description.velocities
-        self.shift = ti.field(backend.dtype, fluid.count)
-        """Displacement [m] of the frame at the time of the due particle at each place; `speed` [m/s] is its rate."""
-        self.speed = ti.field(backend.dtype, fluid.count)
+        self.make_fields(self.place_fields(fluid.count), backend.dtype)
         self.table = Timetable(times, [*np.diff(times), 1e30])  # the last piece is the rest after the end
         self.displacement, self.velocity = (ti.field(backend.dtype, self.table.count) for _ in range(2))
         store(self.displacement, np.array(displacements))
         store(self.velocity, np.array([*velocities, 0.0]))
+
+    @staticmethod
+    def place_fields(count: int) -> list[Declared]:
+        """Declare the fields with an entry for each of `count` places of fluid particles.
+
+        That is the displacement [m] of the frame at the time of the due particle there, and its rate [m/s].
+        """
+        return reals(count, "shift", "speed")
 
     @ti.func
     def motion(self, now, tick):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from taichi_rts.device.backend import Backend, ti
+from taichi_rts.device.fields import Declared, Part, reals
 from taichi_rts.sampling.walls import WallLayer
 from taichi_rts.scene.geometry.bodies import Body
 from taichi_rts.scene.obstacles.solid import DistanceGrid
@@ -19,7 +20,7 @@ PROJECTIONS = 4  # of a point that is inside: the distance is not linear at edge
 
 
 @ti.data_oriented
-class Keeper:
+class Keeper(Part):
     """Keeps the centres of particles out of an obstacle, as the domain's box keeps them in; `body`: None if it is at rest."""
 
     def __init__(self, grid: DistanceGrid, geometry: Geometry, body: Body | None = None) -> None:
@@ -31,8 +32,13 @@ class Keeper:
         self.origin = tuple(grid.origin.tolist())
         self.scale = 1.0 / grid.step
         self.shape = grid.values.shape
-        self.values = ti.field(float, self.shape)
+        self.make_fields(self.fields(self.shape))
         store(self.values, grid.values)
+
+    @staticmethod
+    def fields(nodes: tuple[int, ...]) -> list[Declared]:
+        """Declare the table of distances at `nodes`, (dim,), along each axis."""
+        return reals(nodes, "values")
 
     @ti.func
     def look(self, x):
@@ -111,15 +117,23 @@ class MovingBody(Walls):
         self, body: Body, layer: WallLayer, fluid: Neighbourhood, grid: BlockGrid, support: float, backend: Backend
     ) -> None:
         arms = replace(layer, positions=layer.positions - body.pivot)
-        lower, upper = arms.positions.min(axis=0) - 2.0 * support, arms.positions.max(axis=0) + 2.0 * support
-        super().__init__(arms, fluid, Geometry(lower.tolist(), upper.tolist(), support), backend)
+        around = self.own_geometry(arms.positions.min(axis=0), arms.positions.max(axis=0), support)
+        super().__init__(arms, fluid, around, backend)
         self.grid = grid
         self.domain = grid.geometry
-        dim, blocks = self.domain.dim, self.domain.blocks
-        self.pivot, self.velocity = (ti.Vector.field(dim, float, blocks) for _ in range(2))
-        self.turn = ti.Matrix.field(dim, dim, float, blocks)
-        self.spin = ti.Vector.field(1 if dim == 2 else 3, float, blocks)
+        self.make_fields(self.pose_fields(self.domain.blocks, self.domain.dim))
         self.path = Path(body)
+
+    @staticmethod
+    def own_geometry(lower: np.ndarray, upper: np.ndarray, support: float) -> Geometry:
+        """Return the blocks around particles between `lower` and `upper` [m], (dim,), as seen from the pivot."""
+        return Geometry((lower - 2.0 * support).tolist(), (upper + 2.0 * support).tolist(), support)
+
+    @staticmethod
+    def pose_fields(blocks: int, dim: int) -> list[Declared]:
+        """Declare the pose for each of the domain's `blocks`."""
+        shapes = {"pivot": (dim,), "velocity": (dim,), "turn": (dim, dim), "spin": (1 if dim == 2 else 3,)}
+        return [Declared(name, float, blocks, shape) for name, shape in shapes.items()]
 
     @ti.func
     def block(self, k):

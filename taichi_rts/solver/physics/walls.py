@@ -15,9 +15,10 @@ import numpy as np
 
 from taichi_rts.device.backend import Backend, ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
+from taichi_rts.device.fields import Declared, Part, integers, reals, vectors
 from taichi_rts.sampling.walls import WallLayer
 from taichi_rts.solver.grid.geometry import Geometry
-from taichi_rts.solver.particles.fields import Rows, Values, vector_field
+from taichi_rts.solver.particles.fields import Rows, Values
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
 
 LARGEST_SHEAR = 4.0
@@ -27,7 +28,7 @@ must still count as it is."""
 
 
 @ti.data_oriented
-class Walls:
+class Walls(Part):
     """Wall particles at rest, sorted into the grid's cells once.
 
     Positions x [m], volumes [m^dim], and normals into the fluid; `near` flags blocks that see one.
@@ -50,20 +51,27 @@ class Walls:
         order = np.argsort(cell, kind="stable")
         start = np.searchsorted(cell[order], np.arange(geometry.cells + 1))
         near = geometry.spread(np.diff(start[::CELLS_PER_BLOCK]) > 0)
-        padded = self.count + backend.lanes
-        self.x = vector_field(geometry.dim, backend.dtype, padded)
-        self.volume = ti.field(backend.dtype, padded)
-        self.normal = vector_field(geometry.dim, backend.dtype, padded)
         self.depth = layer.depth
         self.stiffness = layer.stiffness
         self.layered = bool((layer.depths != layer.depth).any())
+        padded = self.count + backend.lanes
+        self.make_fields(self.particle_fields(padded, geometry.dim, self.layered), backend.dtype)
         if self.layered:
-            self.depths = ti.field(backend.dtype, padded)
             self.depths.from_numpy(np.pad(layer.depths[order], (0, backend.lanes)).astype(backend.numpy_dtype))
-        self.start = ti.field(ti.i32, geometry.cells + 1)
-        self.near = ti.field(ti.i32, geometry.blocks)
+        self.make_fields(self.block_fields(geometry.blocks))
         sorted_ = (values[order].astype(backend.numpy_dtype) for values in (positions, volumes, layer.normals))
         self.load(*sorted_, start.astype(np.int32), near.astype(np.int32))
+
+    @staticmethod
+    def particle_fields(entries: int, dim: int, layered: bool) -> list[Declared]:
+        """Declare the fields with `entries` for wall particles; `layered`: in several planes."""
+        declared = [*vectors(dim, entries, "x"), *reals(entries, "volume"), *vectors(dim, entries, "normal")]
+        return declared + reals(entries, "depths") if layered else declared
+
+    @staticmethod
+    def block_fields(blocks: int) -> list[Declared]:
+        """Declare the fields for `blocks` of the grid that the particles are sorted into."""
+        return [*integers(blocks * CELLS_PER_BLOCK + 1, "start"), *integers(blocks, "near")]
 
     @ti.kernel
     def load(self, x: Rows, volume: Values, normal: Rows, start: Values, near: Values):
@@ -80,10 +88,7 @@ class Walls:
     def room_for(self, count: int) -> "Walls":
         """Return the same with room for `count` particles, none of which is there yet."""
         other = copy.copy(self)
-        other.x, other.normal = (vector_field(self.geometry.dim, self.dtype, count) for _ in range(2))
-        other.volume = ti.field(self.dtype, count)
-        if self.layered:
-            other.depths = ti.field(self.dtype, count)
+        other.make_fields(self.particle_fields(count, self.geometry.dim, self.layered), self.dtype)
         return other
 
     @ti.func

@@ -3,6 +3,7 @@
 from typing import Any
 
 from taichi_rts.device.backend import ti
+from taichi_rts.device.fields import Declared, Part, reals, within
 from taichi_rts.medium.equation_of_state import tait
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
@@ -23,7 +24,7 @@ Kinetic energy after 2 s over that with one sound speed: 15 times without slack,
 
 
 @ti.data_oriented
-class SoundRule(Extra):
+class SoundRule(Part, Extra):
     """c_b = max(|v|, sqrt(<p>/rho_0)) / mach over the block and those around it, and at least half of a neighbour's.
 
     Why: density then varies by mach^2 (1 %) everywhere, as it does in the whole with one sound speed of ten times the largest
@@ -56,19 +57,19 @@ class SoundRule(Extra):
         self.forgetting = 1.0 / (description.memory * scene.support)
         """1/(memory r) [1/m]: times c, the rate at which sound speeds fall and reference densities relax."""
         self.blocks = grid.geometry.blocks
-        self.wish = ti.field(float, self.blocks)
-        """What a block needs for itself."""
-        self.wish_ceiling = ti.field(float, self.blocks)
-        """The same, with slack."""
-        self.own = ti.field(float, self.blocks)
-        """The largest sound speed of its particles, at their present compression."""
-        self.felt = ti.field(float, self.blocks)
-        """What its neighbours take into account: its own need, and half of its target."""
-        self.target = ti.field(float, self.blocks)
-        self.ceiling = ti.field(float, self.blocks)
-        self.limit = ti.field(float, self.blocks)
-        self.acceleration2 = ti.field(float, self.blocks)
-        self.viscosity = ti.field(float, self.blocks)
+        self.make_fields(self.fields(self.blocks))
+
+    @staticmethod
+    def fields(blocks: int) -> list[Declared]:
+        """Declare the fields for `blocks`.
+
+        Besides those that the class describes: `wish` is what a block needs for itself, `wish_ceiling` the same with slack, `own`
+        the largest sound speed of its particles at their present compression, and `felt` what its neighbours take into account,
+        its own need and half of its target.
+        """
+        own = reals(blocks, "wish", "wish_ceiling", "own", "felt")
+        given = reals(blocks, "target", "ceiling", "limit", "acceleration2", "viscosity")
+        return own + given + within("grid", BlockGrid.vacated_fields(blocks))
 
     def update(self, read_at: ti.Field, now: int, tick: float) -> None:
         """Work out the targets and limits of all blocks at tick `now`.

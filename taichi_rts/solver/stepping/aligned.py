@@ -1,6 +1,9 @@
 """Aligned blocks: steps end at multiples of themselves, so that blocks of one level are due together, and as a whole."""
 
+from typing import Any
+
 from taichi_rts.device.backend import ti
+from taichi_rts.device.fields import Declared, integers, within
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.particles.particles import FluidState
@@ -32,8 +35,15 @@ class AlignedBlocks(RegionalSchedule):
         grid.track_arrivals()
         self.until_next, self.ends = (ti.field(ti.i32, ()) for _ in range(2))
         """Ticks to the next step, and whether aligned steps of n ticks end now, in bit n - 1."""
-        self.held = ti.field(ti.i32, self.blocks)
-        """Particles times base steps that are not in `occupancy` yet: one by one is quicker than all in one place."""
+
+    @classmethod
+    def fields(cls, settled: Any, particles: int, blocks: int, *, serial: bool) -> list[Declared]:
+        """Declare the fields for so many particles and blocks.
+
+        `held` is particles times base steps that are not in `occupancy` yet: one by one is quicker than all in one place.
+        """
+        more = [*integers(blocks, "held"), *within("grid", BlockGrid.arrival_fields(blocks))]
+        return super().fields(settled, particles, blocks, serial=serial) + more
 
     def restart(self, now: int) -> None:
         """Forget steps and levels."""

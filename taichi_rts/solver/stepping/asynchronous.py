@@ -16,6 +16,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from taichi_rts.device.fields import Declared
 from taichi_rts.errors import StepperError
 from taichi_rts.scene.scene import Scene
 from taichi_rts.scene.validation import FROZEN, Positive, validated
@@ -61,7 +62,6 @@ class Asynchronous(Stepper):
 
     name: ClassVar[str] = "asynchronous"
     key: ClassVar[str] = "a"
-    block_integers: ClassVar[int] = 8
     compared: ClassVar[tuple[Setup, ...]] = (Setup("asynchronous"), Setup("asynchronous-c", regional_sound=True))
     mapped: ClassVar[tuple[Setup, ...]] = (
         Setup("asynchronous"),
@@ -146,6 +146,10 @@ class Asynchronous(Stepper):
             staggered=self.stagger is not None,
             seed=self.stagger or 0,
         )
+
+    def schedule_fields(self, scene: Scene, particles: int, blocks: int, *, serial: bool) -> list[Declared]:
+        """Declare the fields of its schedule."""
+        return AsynchronousSchedule.fields(self.in_scene(scene), particles, blocks, serial=serial)
 
     def schedule(self, scene: Scene, particles: FluidState, grid: BlockGrid, timeline: Timeline) -> Schedule:
         """Build the fields and kernels that find the cells that may step."""

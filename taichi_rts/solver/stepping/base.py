@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from pydantic import Field
 
 from taichi_rts.device.backend import ti
+from taichi_rts.device.fields import Declared, Part, integers
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.integrators.serna import Serna
@@ -51,7 +52,8 @@ class Stepper:
     Attributes:
         name: on the command line, in files and in messages.
         key: letter that chooses it in the window, besides its number; empty for none.
-        block_integers: how many fields of 32-bit integers its schedule has with an entry for each block of the grid, at most.
+        block_integers: how many fields of 32-bit integers its schedule has with an entry for each block of the grid, at most,
+            unless `schedule_fields` says it exactly.
         compared: what `taichi-rts compare` calls by which names; empty: the stepper alone, by its own.
         mapped: what the stability map has columns for; empty: the stepper alone, by its own name.
     """
@@ -117,13 +119,21 @@ class Stepper:
         """Return the clock for `scene`: its tick divides the base step."""
         raise NotImplementedError
 
+    def schedule_fields(self, scene: Scene, particles: int, blocks: int, *, serial: bool) -> list[Declared]:
+        """Declare the fields that its schedule makes in `scene`, for so many particles and blocks; `serial`: on a CPU.
+
+        Memory is counted from them before a run. This is an estimate, with two fields of integers for each particle.
+        """
+        names = [f"integers {n}" for n in range(self.block_integers)]
+        return [*integers(particles, "due", "flag"), *integers(blocks, *names)]
+
     def schedule(self, scene: Scene, particles: FluidState, grid: BlockGrid, timeline: Timeline) -> Schedule:
         """Build the fields and kernels that decide which particles are due."""
         raise NotImplementedError
 
 
 @ti.data_oriented
-class Schedule:
+class Schedule(Part):
     """Which particles are due in the present step.
 
     Attributes:
@@ -151,14 +161,22 @@ class Schedule:
     sound: Any = None
     transient = frozenset({"due", "flag"})
 
-    def __init__(self, particles: FluidState, grid: BlockGrid) -> None:
+    def __init__(self, particles: FluidState, grid: BlockGrid, settled: Any = None) -> None:
         self.particles = particles
         self.grid = grid
         self.due = grid.rank  # which only a sort needs, and after a sort the list is made anew
         self.due_count = ti.field(ti.i32, ())
-        self.read_at = ti.field(ti.i32, grid.geometry.blocks)
+        self.make_fields(self.fields(settled, particles.capacity, grid.geometry.blocks, serial=grid.serial))
         self.steps = 0
         self.debug = False
+
+    @classmethod
+    def fields(cls, settled: Any, particles: int, blocks: int, *, serial: bool) -> list[Declared]:
+        """Declare the fields for so many particles and blocks: all that the constructor makes, those of derived classes too.
+
+        `settled` is what the stepper has settled for the scene (`Stepper.in_scene`), or None; `serial`: on a CPU.
+        """
+        return integers(blocks, "read_at")
 
     @ti.func
     def due_in(self, m):

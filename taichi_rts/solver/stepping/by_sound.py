@@ -13,9 +13,10 @@ class BlocksBySound(AlignedBlocks):
 
     reach_of_regions = 2  # the sound speed has spread by a block already
 
-    def ratio_sweeps(self) -> int:
+    @classmethod
+    def ratio_sweeps(cls, levels: int) -> int:
         """One: sound speeds are graded already; forces are not, but reach no further."""
-        return min(1, super().ratio_sweeps())
+        return min(1, super().ratio_sweeps(levels))
 
     def retime(self, settled: SettledRegions, timeline: Timeline | None = None) -> bool:
         """Take another courant."""

@@ -3,13 +3,17 @@
 The rule is proved in `asynchronous.py`; this file finds the cells that obey it.
 """
 
+from typing import Any
+
 from taichi_rts.device.backend import ti
 from taichi_rts.device.counters import Counters
+from taichi_rts.device.fields import Declared, integers, within
 from taichi_rts.device.scan import ExclusiveScan
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.stepping.base import Schedule
 from taichi_rts.solver.stepping.limiter import EMPTY
+from taichi_rts.solver.stepping.settled import SettledCells
 
 
 @ti.data_oriented
@@ -21,28 +25,34 @@ class Cells(Schedule):
 
     EMPTY = EMPTY
 
-    def __init__(self, particles: FluidState, grid: BlockGrid, levels: int) -> None:
-        super().__init__(particles, grid)
-        self.levels = levels
-        blocks = grid.geometry.blocks
-        self.blocks = blocks
+    def __init__(self, particles: FluidState, grid: BlockGrid, settled: SettledCells) -> None:
+        super().__init__(particles, grid, settled)
+        self.levels = settled.levels
+        self.blocks = grid.geometry.blocks
         self.occupied, self.occupied_count = grid.occupied, grid.occupied_count
-        self.time = ti.field(ti.i32, blocks)
-        """Tick of each cell: the end of its youngest particle's step; `EMPTY` where there is none."""
-        self.step = ti.field(ti.i32, blocks)
-        """Shortest step [ticks] of each cell's particles."""
-        self.ready = ti.field(ti.i32, blocks)
         self.proposal = self.ready  # `ready` is not read again once the next steps are proposed
-        self.claim = ti.field(ti.i32, blocks)
-        self.block_due = ti.field(ti.i32, blocks)
-        self.due_start = ti.field(ti.i32, blocks + 1)
         self.due_scan = ExclusiveScan(self.block_due, self.due_start)
         self.due_count = self.due_scan.total
         self.youngest = ti.field(ti.i32, ())
         self.stepping = ti.field(ti.i32, ())
         self.extrapolated = ti.field(ti.i32, ())
-        self.updates = Counters(levels + 1)
+        self.updates = Counters(self.levels + 1)
         """Updates by the ticks that had elapsed."""
+
+    @classmethod
+    def fields(cls, settled: Any, particles: int, blocks: int, *, serial: bool) -> list[Declared]:
+        """Declare the fields for so many particles and blocks.
+
+        `time` is the tick of each cell, the end of its youngest particle's step, and `EMPTY` where there is none; `step` is
+        the shortest step [ticks] of its particles.
+        """
+        return [
+            *super().fields(settled, particles, blocks, serial=serial),
+            *integers(blocks, "time", "step", "ready", "claim", "block_due"),
+            *integers(blocks + 1, "due_start"),
+            *within("due_scan", ExclusiveScan.fields(blocks)),
+            *within("updates", Counters.fields(settled.levels + 1)),
+        ]
 
     def find_cells(self) -> None:
         """Find the occupied cells of a grid that has been sorted anew, their times and steps."""

@@ -8,6 +8,7 @@ import numpy as np
 from taichi_rts.device import backend
 from taichi_rts.device.backend import ti
 from taichi_rts.device.counters import Counters
+from taichi_rts.device.fields import Declared, integers
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.particles.particles import FluidState
@@ -38,7 +39,7 @@ class AsynchronousSchedule(Cells):
     def __init__(
         self, settled: SettledCells, scene: Scene, particles: FluidState, grid: BlockGrid, timeline: Timeline
     ) -> None:
-        super().__init__(particles, grid, settled.levels)
+        super().__init__(particles, grid, settled)
         self.scene = scene
         self.retime(settled, timeline)
         self.maxima = BlockMaxima(scene, particles, grid)
@@ -52,7 +53,6 @@ class AsynchronousSchedule(Cells):
         self.drift_time = ti.field(float, ())
         self.passes = ti.field(ti.i32, ())
         self.passes_in_cycle = ti.field(ti.i32, ())
-        self.widths = ti.field(ti.i32, LOG)
         self.wakes = Counters()
         self.clamped = Counters()
         self.target = 0
@@ -62,6 +62,11 @@ class AsynchronousSchedule(Cells):
         self.blind = 0
         self.reads_are_slow = backend.current().arch != "cpu"
         self.seen_widths: list[np.ndarray] = []
+
+    @classmethod
+    def fields(cls, settled: Any, particles: int, blocks: int, *, serial: bool) -> list[Declared]:
+        """Declare the fields for so many particles and blocks."""
+        return super().fields(settled, particles, blocks, serial=serial) + integers(LOG, "widths")
 
     def retime(self, settled: SettledCells, timeline: Timeline) -> bool:
         """Take another courant; the number of ticks in the longest step is compiled in."""

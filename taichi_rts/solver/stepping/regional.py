@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from taichi_rts.device.fields import Declared
 from taichi_rts.errors import StepperError
 from taichi_rts.scene.scene import Scene
 from taichi_rts.scene.validation import FROZEN, Positive, validated
@@ -17,6 +18,7 @@ from taichi_rts.solver.stepping import criteria
 from taichi_rts.solver.stepping.aligned import AlignedBlocks
 from taichi_rts.solver.stepping.base import ONE_STEP_COURANT, Courant, Schedule, Setup, Stepper
 from taichi_rts.solver.stepping.by_sound import BlocksBySound
+from taichi_rts.solver.stepping.regions import RegionalSchedule
 from taichi_rts.solver.stepping.settled import SettledRegions, lengths
 from taichi_rts.solver.stepping.timeline import Timeline
 from taichi_rts.solver.stepping.validity import ValidityByParticle
@@ -115,7 +117,6 @@ class Regional(Stepper):
 
     name: ClassVar[str] = "regional"
     key: ClassVar[str] = "g"
-    block_integers: ClassVar[int] = 9
     compared: ClassVar[tuple[Setup, ...]] = (
         Setup("regional"),
         Setup("paper", {"preset": "paper"}, of_longest=False),
@@ -212,7 +213,13 @@ class Regional(Stepper):
 
     def schedule(self, scene: Scene, particles: FluidState, grid: BlockGrid, timeline: Timeline) -> Schedule:
         """Build the schedule of Algorithm 1: by particle as in the paper, of aligned blocks, or by sound speed."""
-        settled = self.in_scene(scene)
+        return self._scheme(scene)(self.in_scene(scene), scene, particles, grid)
+
+    def schedule_fields(self, scene: Scene, particles: int, blocks: int, *, serial: bool) -> list[Declared]:
+        """Declare the fields of its schedule."""
+        return self._scheme(scene).fields(self.in_scene(scene), particles, blocks, serial=serial)
+
+    def _scheme(self, scene: Scene) -> type[RegionalSchedule]:
         if scene.regional_sound is not None:
-            return BlocksBySound(settled, scene, particles, grid)
-        return (AlignedBlocks if settled.aligned else ValidityByParticle)(settled, scene, particles, grid)
+            return BlocksBySound
+        return AlignedBlocks if self.in_scene(scene).aligned else ValidityByParticle

@@ -5,9 +5,11 @@ What all schemes share. When a block or a particle is due is the schemes' own: `
 """
 
 import math
+from typing import Any
 
 from taichi_rts.device.backend import threads, ti
 from taichi_rts.device.counters import Counters
+from taichi_rts.device.fields import Declared, integers, within
 from taichi_rts.device.scan import ExclusiveScan
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
@@ -37,7 +39,7 @@ class RegionalSchedule(Schedule):
     """How much longer than a neighbour's a block's step may be at once: 1 is the paper's R_min."""
 
     def __init__(self, settled: SettledRegions, scene: Scene, particles: FluidState, grid: BlockGrid) -> None:
-        super().__init__(particles, grid)
+        super().__init__(particles, grid, settled)
         self.scene = scene
         self.levels = settled.levels
         self.lambda_f = settled.lambda_f
@@ -49,47 +51,69 @@ class RegionalSchedule(Schedule):
         self.lengths = list(settled.lengths)
         self.ladder = Ladder(self.lengths)
         self.limits = settled.limiter
-        blocks = self.blocks = grid.geometry.blocks
-        self.raw_level = ti.field(ti.i32, blocks)
-        self.block_level = ti.field(ti.i32, blocks)
+        self.blocks = grid.geometry.blocks
         self.level_fields = [self.raw_level, self.block_level]
         self.keeps_last = self.aligned or self.limits
         if self.keeps_last:
-            self.last_level = ti.field(ti.i32, blocks)
             self.level_fields.append(self.last_level)
         self.maxima = BlockMaxima(scene, particles, grid)
         self.present, self.passed = (ti.field(ti.i32, ()) for _ in range(2))
         """Tick, and ticks since the last call."""
         self.now = 0
-        self.sweeps = self.make_sweeps(settled.grading) if self.levels > 1 else []
+        self.sweeps = self.make_sweeps(settled) if self.levels > 1 else []
         self.around = Surroundings(grid)
         for field in self.level_fields:
             field.fill(EMPTY)
         self.read_at.fill(-1)
         grid.track_vacated()
-        self.block_due = ti.field(ti.i32, blocks)
-        self.due_start = ti.field(ti.i32, blocks + 1)
         if not grid.serial:
             self.scan = ExclusiveScan(self.block_due, self.due_start)
             self.due_count = self.scan.total
-        self.rows = threads() if grid.serial else 1
-        self.width = -(-(self.levels + 1) // 16) * 16
+        self.rows, self.width = self.counts_shape(self.levels, serial=grid.serial)
         self.occupancy, self.updates = (Counters(self.rows * self.width, alone=grid.serial) for _ in range(2))
         """Particles and updates by level, of each thread of a CPU for itself: in one place they would wait for each other."""
 
+    @classmethod
+    def fields(cls, settled: Any, particles: int, blocks: int, *, serial: bool) -> list[Declared]:
+        """Declare the fields for so many particles and blocks."""
+        counts = Counters.fields(math.prod(cls.counts_shape(settled.levels, serial=serial)))
+        return [
+            *super().fields(settled, particles, blocks, serial=serial),
+            *integers(blocks, "raw_level", "block_level"),
+            *(integers(blocks, "last_level") if cls.aligned or settled.limiter else []),
+            *(integers(blocks, "swept") if sum(cls.more_sweeps(settled)) else []),
+            *within("grid", BlockGrid.vacated_fields(blocks)),
+            *integers(blocks, "block_due"),
+            *integers(blocks + 1, "due_start"),
+            *([] if serial else within("scan", ExclusiveScan.fields(blocks))),
+            *within("occupancy", counts),
+            *within("updates", counts),
+        ]
+
+    @staticmethod
+    def counts_shape(levels: int, *, serial: bool) -> tuple[int, int]:
+        """Return rows and columns of what is counted by level: a row a thread, in whole lines of the cache."""
+        return threads() if serial else 1, -(-(levels + 1) // 16) * 16
+
     # -- which rules there are ----------------------------------------------------------------------------------------
 
-    def make_sweeps(self, grading: bool) -> list[Sweep]:
+    @classmethod
+    def more_sweeps(cls, settled: SettledRegions) -> tuple[int, int]:
+        """Return how many sweeps follow the first: of the limiter, and of grading."""
+        if settled.levels == 1:
+            return 0, 0
+        grading = max(0, len(settled.lengths) - 2) if settled.grading else 0
+        return cls.ratio_sweeps(settled.levels) if settled.limiter else 0, grading
+
+    def make_sweeps(self, settled: SettledRegions) -> list[Sweep]:
         """Return the sweeps from `raw_level` to `block_level`: R_min and growth, the limiter's, and those of grading.
 
         Each spreads by a block; the last goes on with lines 10-16 for each block that it is done with.
         """
-        rules = self.ratio_sweeps() * [self.twice] if self.limits else []
-        if grading:
-            rules += max(0, len(self.lengths) - 2) * [self.ladder.above]
+        limiting, grading = self.more_sweeps(settled)
+        rules = limiting * [self.twice] + grading * [self.ladder.above]
         to_and_fro = [self.block_level]
         if rules:
-            self.swept = ti.field(ti.i32, self.blocks)
             self.level_fields.append(self.swept)
             to_and_fro = [self.block_level, self.swept]
         left = len(rules)
@@ -97,7 +121,7 @@ class RegionalSchedule(Schedule):
         most = self.same if self.reach_of_regions == 1 else self.twice
         sweeps: list[Sweep] = [Sweep(self.raw_level, target, most, then)]
         if self.limits:
-            growth = self.ladder.above if grading else self.twice
+            growth = self.ladder.above if settled.grading else self.twice
             growing = (self.ladder, most, growth, self.present, then)
             sweeps = [GrowingSweep(self.raw_level, self.last_level, target, *growing)]
         for rule in rules:
@@ -106,9 +130,10 @@ class RegionalSchedule(Schedule):
             sweeps.append(Sweep(source, target, rule, self.settle if left == 0 else None))
         return sweeps
 
-    def ratio_sweeps(self) -> int:
+    @classmethod
+    def ratio_sweeps(cls, levels: int) -> int:
         """How many sweeps it takes until no block steps more than `NeighbourLimiter.RATIO` times as long as a neighbour."""
-        return max(0, math.ceil(math.log2(self.levels)) - 1)
+        return max(0, math.ceil(math.log2(levels)) - 1)
 
     @ti.func
     def same(self, level):

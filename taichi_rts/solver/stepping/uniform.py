@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Literal
 from pydantic.dataclasses import dataclass
 
 from taichi_rts.device.backend import ti
+from taichi_rts.device.fields import Declared, integers
 from taichi_rts.errors import StepperError
 from taichi_rts.scene.scene import Scene
 from taichi_rts.scene.validation import FROZEN, Positive, validated
@@ -41,7 +42,6 @@ class Uniform(Stepper):
 
     name: ClassVar[str] = "uniform"
     key: ClassVar[str] = "u"
-    block_integers: ClassVar[int] = 1
     compared: ClassVar[tuple[Setup, ...]] = (
         Setup("uniform"),
         Setup("uniform-c", {"adaptive": True}, regional_sound=True),
@@ -74,6 +74,10 @@ class Uniform(Stepper):
         )
         return Timeline(step / SUBDIVISIONS if self.adaptive else step)
 
+    def schedule_fields(self, scene: Scene, particles: int, blocks: int, *, serial: bool) -> list[Declared]:
+        """Declare the fields of its schedule."""
+        return UniformSchedule.fields(self, particles, blocks, serial=serial)
+
     def schedule(self, scene: Scene, particles: FluidState, grid: BlockGrid, timeline: Timeline) -> Schedule:
         """Build the schedule under which all particles are always due."""
         if self.adaptive:
@@ -87,10 +91,14 @@ class UniformSchedule(Schedule):
 
     def __init__(self, particles: FluidState, grid: BlockGrid) -> None:
         super().__init__(particles, grid)
-        self.due = ti.field(ti.i32, particles.capacity)
         particles.level.fill(1)
         self.due_count = particles.alive
         self.mark_all()
+
+    @classmethod
+    def fields(cls, settled: Any, particles: int, blocks: int, *, serial: bool) -> list[Declared]:
+        """Declare the fields for so many particles and blocks."""
+        return super().fields(settled, particles, blocks, serial=serial) + integers(particles, "due")
 
     @ti.kernel
     def mark_all(self):

@@ -1,11 +1,10 @@
 """The paper's scheme: every particle has a validity of its own (Goswami & Batty 2014, Algorithm 1, lines 10-16)."""
 
+from typing import Any
+
 from taichi_rts.device.backend import ti
-from taichi_rts.scene.scene import Scene
-from taichi_rts.solver.grid.grid import BlockGrid
-from taichi_rts.solver.particles.particles import FluidState
+from taichi_rts.device.fields import Declared, integers
 from taichi_rts.solver.stepping.regions import RegionalSchedule
-from taichi_rts.solver.stepping.settled import SettledRegions
 
 
 @ti.data_oriented
@@ -15,10 +14,10 @@ class ValidityByParticle(RegionalSchedule):
     validity = level - (now - updated), so that no particle has to count it down (lines 14-16).
     """
 
-    def __init__(self, settled: SettledRegions, scene: Scene, particles: FluidState, grid: BlockGrid) -> None:
-        super().__init__(settled, scene, particles, grid)
-        self.flag = ti.field(ti.i32, particles.capacity)
-        """The compute flag of the particle at a place."""
+    @classmethod
+    def fields(cls, settled: Any, particles: int, blocks: int, *, serial: bool) -> list[Declared]:
+        """Declare the fields for so many particles and blocks; `flag` is the compute flag of the particle at a place."""
+        return super().fields(settled, particles, blocks, serial=serial) + integers(particles, "flag")
 
     @ti.func
     def update_validity(self, block, now, passed):

@@ -3,11 +3,11 @@ import pytest
 
 from taichi_rts.device.backend import Backend, ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
+from taichi_rts.device.fields import vector_field
 from taichi_rts.medium.smoothing import make_kernel
 from taichi_rts.solver.grid.geometry import Geometry
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.grid.sums import make_neighbour_sum
-from taichi_rts.solver.particles.fields import vector_field
 
 SUPPORT = 0.25
 CPU = Backend("cpu", "f64")
