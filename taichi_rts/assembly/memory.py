@@ -33,6 +33,8 @@ LINING = 10 * SAMPLING
 """Bytes of the host per boundary particle of an obstacle and dimension: they are chosen from about ten times as many points."""
 FIXED = 1 << 14
 """Bytes of fields whose size does not depend on the scene, about: single numbers, counts, tables of motions."""
+SINGLE = 64
+"""The same of those that are made between the others, at most."""
 WALL_SHARE = 0.45
 """Entries of the windows on a wall at rest over those of the windows on the fluid at r = 2s, about."""
 
@@ -180,7 +182,7 @@ def buffer_bytes(
     found = declared_fields(scene, stepper, backend, counts, debug=debug)
     real = 8 if precision == "f64" else 4
     sizes = {purpose: float(sum(each.size(real) for each in fields)) for purpose, fields in found.items()}
-    return sizes | {"steps": sizes["steps"] + FIXED}
+    return {purpose: size + (FIXED if purpose == "steps" else SINGLE) for purpose, size in sizes.items()}
 
 
 def host_bytes(scene: Scene, *, spacing: float | None = None) -> float:

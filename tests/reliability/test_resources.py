@@ -142,7 +142,7 @@ def test_a_buffer_beyond_32_bit_addresses_is_refused(monkeypatch):
     monkeypatch.setattr(ti, "field", lambda *args, **options: made.append(args))
     monkeypatch.setattr(ti.Vector, "field", lambda *args, **options: made.append(args))
     message = (
-        r"needs 4\.\d+ GiB for the particles' state with spacing [\d.e-]+, and kernels address no more than 4 GiB at a time on "
+        r"needs 4\.\d+ GiB for the grid and what neighbours see with spacing [\d.e-]+, and kernels address no more than 4 GiB at a time on "
         r"vulkan; use a spacing of at least [\d.e-]+, or use --arch cuda or cpu"
     )
     with pytest.raises(rts.Error, match=message) as caught:
