@@ -66,14 +66,15 @@ def command(*args):
 
 def at_frame(monkeypatch, number, act):
     """Have `act(recorder)` called when a frame has just been written."""
-    write = Recorder._write_frame
+    moments = Recorder.moments
 
-    def wrapped(self, frame, this, films):
-        write(self, frame, this, films)
-        if this == number:
-            act(self)
+    def watched(self, end_time):
+        for moment, frame in moments(self, end_time):
+            yield moment, frame
+            if frame == number:
+                act(self)
 
-    monkeypatch.setattr(Recorder, "_write_frame", wrapped)
+    monkeypatch.setattr(Recorder, "moments", watched)
 
 
 def test_names_sort_by_time_and_times_end_at_the_end():

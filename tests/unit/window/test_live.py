@@ -117,12 +117,12 @@ def test_steppers_and_sliders_change_the_run_and_not_the_fluid(session):
     session.advance()
     assert session.sim.stepper == PAPER  # the run's own, not the default
     session.wanted = replace(session.settings, levels=2)
-    stepper = session._stepper(session.wanted, session.settings)
+    stepper = session.stepper_for(session.wanted, session.settings)
     assert stepper == replace(PAPER, levels=2)
     session.wanted = replace(session.settings, courant=0.9)
-    assert session._stepper(session.wanted, session.settings).courant == pytest.approx(0.3)  # of three levels
+    assert session.stepper_for(session.wanted, session.settings).courant == pytest.approx(0.3)  # of three levels
     asynchronous = replace(session.settings, stepper="asynchronous", levels=5)
-    assert session._stepper(asynchronous, session.settings).levels == 4  # a power of two
+    assert session.stepper_for(asynchronous, session.settings).levels == 4  # a power of two
 
 
 def test_recordings_are_numbered_and_end_with_a_film(session, tmp_path, monkeypatch):

@@ -32,7 +32,6 @@ def scene(**changes):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"periodic": ("z",)}, "periodic: axis 'z' does not exist in two dimensions"),
         ({"periodic": ("x",), "spacing": 0.2}, "1 long along 'x'; it must hold 4 support radii of 0.4.*at most 0.125"),
         (
             {"periodic": ("x",), "spacing": 0.03},
@@ -41,7 +40,6 @@ def scene(**changes):
         ({"moving_walls": [PISTON], "periodic": ("x",)}, "moving_walls.0: the domain has no wall 'x-'"),
         ({"moving_walls": [PISTON], "walls": False}, "moving_walls.0: the domain has no wall 'x-'"),
         ({"moving_walls": [PISTON, PISTON]}, "moving_walls: two of them are the same face"),
-        ({"moving_walls": [rts.MovingWall("x-", (0, 1), (0, 0.95))]}, "moving_walls.0: 'x-' would close the domain"),
         ({"inflows": [rts.Inflow((0.4, 0.9), (0.5, 0.9), (0, -3))]}, "inflows.0: the patch must lie on face 'y\\+'"),
         ({"inflows": [rts.Inflow((0.4, 1), (0.5, 1), (0, 3))]}, "inflows.0: the patch must lie on face 'y-'"),
         ({"inflows": [rts.Inflow((0.4, 1), (0.42, 1), (0, -3))]}, "narrower than the spacing 0.05"),
@@ -59,13 +57,11 @@ def test_contradictions_name_value_limit_and_remedy(changes, message):
     ("make", "message"),
     [
         (lambda: rts.MovingWall("x-", (0, 1), (0.1, 0.2)), "must begin with 0"),
-        (lambda: rts.MovingWall("x-", (1, 0), (0, 0.2)), "must ascend"),
         (lambda: rts.MovingWall("x-", (0, 1, 2), (0, 0.2)), "times has 3 entries, displacements 2"),
         (lambda: rts.MovingWall("x+", (0, 1), (0, 0.2)), "take face 'x\\+' out of the domain"),
         (lambda: rts.MovingWall("w", (0, 1), (0, 0.2)), "'x-', 'x\\+'"),
         (lambda: rts.Inflow((0, 0), (1, 1), (0, 1)), "is not flat"),
         (lambda: rts.Inflow((0, 0), (1, 0), (1, 0)), "does not cross the patch; give it a component along y"),
-        (lambda: rts.Inflow((0, 0), (1, 0), (0, 1), start=2, stop=1), "stop 1.0 must exceed start 2.0"),
         (lambda: rts.Inflow((0, 0), (1, 0), (0, 1, 0)), "differ in dimension"),
     ],
 )
