@@ -28,7 +28,14 @@ SEEN = (
 """Kinds that once had levels whose step never ended: a block at such a level was never evaluated again."""
 
 
-@pytest.mark.parametrize("combination", [c for c in ALL if str(c) in SEEN], ids=str)
+@pytest.mark.parametrize(
+    "combination",
+    [
+        pytest.param(each, id=str(each), marks=pytest.mark.slow if str(each).startswith("6") else [])
+        for each in ALL
+        if str(each) in SEEN
+    ],
+)
 def test_every_level_is_a_step_that_ends(start_taichi, quick, combination):
     with start_taichi("cpu", "f32", **quick):
         energy, density, _ = run(combination.of(drop_on_pool()), combination.stepper)

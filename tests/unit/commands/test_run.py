@@ -38,7 +38,7 @@ def run(*args):
 @pytest.fixture(scope="module")
 def two_runs(tmp_path_factory):
     folders = [tmp_path_factory.mktemp("run") / name for name in ("one", "two")]
-    results = [run("run", "double_dam_break", "--preset", "paper", *SMALL, "--output-dir", str(f)) for f in folders]
+    results = [run("run", "double_dam_break_2d", "--preset", "paper", *SMALL, "--output-dir", str(f)) for f in folders]
     assert all(result.returncode == 0 for result in results), results[0].stderr
     return folders, results
 
@@ -72,15 +72,6 @@ def test_the_same_command_gives_the_same_bits(two_runs):
     ]
     assert hashes[0] == hashes[1]
     assert len(set(hashes[0])) == 3
-
-
-def test_existing_output_is_kept(two_runs):
-    (folder, _), _ = two_runs
-    before = (folder / "run.json").read_text()
-    result = run("run", "double_dam_break", *SMALL, "--output-dir", str(folder))
-    assert result.returncode == 2
-    assert "--overwrite" in result.stderr
-    assert (folder / "run.json").read_text() == before
 
 
 def test_a_window_takes_what_demos_set_and_what_it_can_obey(monkeypatch):

@@ -126,15 +126,17 @@ def test_wide_supports_have_as_many_planes_behind_every_face_but_the_inflows():
     assert len(layer.positions) == 2 * 2 * 20
 
 
-@pytest.mark.parametrize("density", ["summation", "continuity"])
+@pytest.mark.parametrize("density", ["summation", pytest.param("continuity", marks=pytest.mark.slow)])
 def test_a_face_that_may_move_pushes_as_one_at_rest(simulate, density):
-    """With several planes, and friction on them."""
+    """With several planes, and friction on them. The work of moving walls needs a debug run, which this is not."""
     medium = {"support_ratio": 3.0, "kernel": "wendland_c2", "kinematic_viscosity": 0.01, "density": density}
     slid = rts.Block((0, 0), (0.5, 0.4), velocity=(0.3, -0.5))
     pushes = []
     for walls in ([], [rts.MovingWall("x-", (5, 6), (0, 0.1)), rts.MovingWall("y-", (5, 6), (0, 0.1))]):
         sim = simulate(scene(fluids=[slid], moving_walls=walls, sound_speed=20.0, **medium), rts.Uniform())
         pushes.append(sim.particles.to_numpy(sim.particles.a))
+    with pytest.raises(rts.Error, match="debug=True"):
+        sim.work()
     assert np.abs(pushes[0][:, 0]).max() > 3.0
     np.testing.assert_allclose(pushes[1], pushes[0], rtol=1e-9, atol=1e-9)
 
@@ -228,12 +230,6 @@ def test_a_piston_pushes_and_its_work_is_counted(simulate, stepper):
     assert sim.work() > 100.0
     assert sim.energy().total == pytest.approx(sim.work(), rel=0.03)
     assert np.abs(sim.momentum_drift()).max() < 0.02 * np.abs(sim.momentum()).max()
-
-
-def test_work_of_walls_needs_a_debug_run(simulate, unstarted):
-    sim = simulate(scene(moving_walls=[PISTON]), rts.Uniform())
-    with pytest.raises(rts.Error, match="debug=True"):
-        sim.work()
 
 
 @each_stepper
