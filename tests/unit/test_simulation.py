@@ -6,6 +6,8 @@ from taichi_rts.solver.solver import REORDER_EVERY
 
 FALLING = rts.Block((0.2, 0.2), (0.4, 0.6), velocity=(1, -2))
 SMALL = rts.Scene(domain=rts.Box((0, 0), (1, 1)), fluids=[FALLING], spacing=0.04)
+COLUMN = rts.Block((0, 0), (0.4, 0.8))
+DAM = rts.Scene(domain=rts.Box((0, 0), (1, 1)), fluids=[COLUMN], spacing=0.05, sound_speed=40.0)
 
 
 @pytest.fixture(scope="module")
@@ -117,9 +119,7 @@ def test_reordering_does_not_depend_on_output_times(taichi_cpu_f64, monkeypatch)
     ids=["uniform", "equal", "integers"],
 )
 def test_momentum_is_accounted_for_by_gravity_and_walls(taichi_cpu_f64, stepper, share):
-    block = rts.Block((0, 0), (0.4, 0.8))
-    scene = rts.Scene(domain=rts.Box((0, 0), (1, 1)), fluids=[block], spacing=0.05, sound_speed=40.0)
-    sim = rts.Simulation(scene, stepper, debug=True)
+    sim = rts.Simulation(DAM, stepper, debug=True)
     assert np.abs(sim.momentum_drift()).max() < 1e-12
     sim.advance_to(0.0503)
     assert np.linalg.norm(sim.momentum()) > 1.0
@@ -128,8 +128,7 @@ def test_momentum_is_accounted_for_by_gravity_and_walls(taichi_cpu_f64, stepper,
 
 
 def test_debug_runs_stop_at_what_must_not_happen(taichi_cpu_f64):
-    scene = rts.Scene(domain=rts.Box((0, 0), (1, 1)), fluids=[rts.Block((0, 0), (0.4, 0.4))], spacing=0.04)
-    sim = rts.Simulation(scene, rts.Asynchronous(steps="integers", stagger=1), debug=True)
+    sim = rts.Simulation(DAM, rts.Asynchronous(steps="integers", stagger=1), debug=True)
     while sim.schedule.begin(sim.timeline, 40):
         if not sim.schedule.needs_sorting:
             break
