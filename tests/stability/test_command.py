@@ -128,6 +128,7 @@ def test_every_case_is_a_small_scene():
         assert sum(fluid.volume for fluid in scene.fluids) / scene.spacing**scene.dim <= 600
 
 
+@pytest.mark.slow
 def test_several_workers_share_the_cases(call):
     folder, _ = call("--quick", "--workers", "2")
     cells = json.loads((folder / "stability.json").read_text())["cells"]

@@ -35,6 +35,7 @@ def test_a_block_at_mach_0_7_on_a_wall(start_taichi, quick, stepper):
     assert outcome.runaways == 0
 
 
+@pytest.mark.slow
 def test_a_fixed_step_cannot_stop_a_block_at_mach_0_7(start_taichi, quick):
     """Documented in docs/evidence/stability.md; should it survive one day, the docs have to change."""
     outcome = run(start_taichi, quick, "wall_impact_0.7", "serna", demanded=1.66)

@@ -221,6 +221,7 @@ def test_no_distance_changes_a_bit_of_what_drives_a_flow(start_taichi, quick, tm
     assert np.abs(found[0]["forces"]).max() > 10.0
 
 
+@pytest.mark.slow
 def test_a_checkpoint_and_another_stepper_go_on_far_from_0(start_taichi, quick, tmp_path):
     with start_taichi("cpu", "f32", **quick):
         sim = rts.Simulation(pool(UTM, body_force=None), rts.Regional(levels=3))

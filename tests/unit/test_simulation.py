@@ -80,7 +80,7 @@ def test_steps_and_leads_are_in_order_of_identity(taichi_cpu_f64, unstarted):
     "stepper",
     [
         pytest.param(rts.Uniform(), id="uniform", marks=pytest.mark.slow),
-        pytest.param(rts.Uniform(adaptive=True), id="adaptive"),
+        pytest.param(rts.Uniform(adaptive=True), id="adaptive", marks=pytest.mark.slow),
         pytest.param(rts.Regional(levels=3), id="regional"),
         pytest.param(rts.Asynchronous(stagger=1, steps="integers"), id="asynchronous"),
     ],

@@ -65,6 +65,7 @@ WAVES = {"regional": (0.020, -0.013), "uniform": (0.036, -0.008), "asynchronous"
 """Errors of period and crest of the standing wave, measured."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stepper", ["regional", *LONG])
 def test_standing_wave(errors, stepper):
     """Ten particles deep; steppers scatter by more than at the docs' size, so each has its own bounds.

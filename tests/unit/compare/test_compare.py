@@ -54,6 +54,7 @@ def check_rewind(stepper):
     assert runs[1][1]["wall_seconds"] > 0.0
 
 
+@pytest.mark.slow  # its parts have quick tests of their own
 def test_a_comparison_from_the_command_line(tmp_path, capsys, quick_jobs, monkeypatch):
     args = ["compare", "dam_break_2d", *SIZE, "--steppers", "uniform,regional", "--courants", "0.4"]
     args += ["--cache-dir", str(tmp_path / "cache"), "--output-dir", str(tmp_path / "out")]

@@ -223,6 +223,7 @@ def test_differences_are_named():
     assert differences({"name": "x", "b": 2}, {"name": "y", "b": 3}) == "name 'x' there and 'y' here"
 
 
+@pytest.mark.slow
 def test_another_arch_goes_on_with_it(start_taichi, taichi_vulkan, tmp_path):
     """What serves one arch alone, such as windows and lists of a sort, is not in the file."""
     scene = rts.load_scene("dam_break_2d", particles="1k", sound_speed="regional")
