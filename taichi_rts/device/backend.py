@@ -264,7 +264,7 @@ def _start(name: str, precision: str, options: dict[str, Any]) -> bool:
     except RuntimeError:
         return False
     if name == "cpu":
-        _pin_threads(sorted(_thread_ids() - others))
+        pin_threads(sorted(_thread_ids() - others))
     return True
 
 
@@ -276,7 +276,7 @@ def _thread_ids() -> set[int]:
         return set()
 
 
-def _pin_threads(started: list[int]) -> None:
+def pin_threads(started: list[int]) -> None:
     """Give every thread of Taichi's pool, the last of those that `ti.init` has `started`, a core of its own.
 
     They sleep between loops, and Linux wakes them on the core that they were woken from: two threads then share one core for

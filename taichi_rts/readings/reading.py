@@ -66,6 +66,7 @@ class Reading:
         particle_updates: so far.
         inflow: mass [kg] that has come in so far, None in a scene without inflows; `outflows` those that each outlet has taken.
         runaways, not_finite: values that had to be limited so far, and states that were not finite (`Motion`).
+        born: ids given so far; `start_fluids` are the fluids' places in the scene of the first of them, (N at the start,).
     """
 
     moment: Moment
@@ -90,8 +91,8 @@ class Reading:
     outflows: tuple[float, ...]
     runaways: int
     not_finite: int
-    _born: int
-    _start_fluids: np.ndarray
+    born: int
+    start_fluids: np.ndarray
 
     @classmethod
     def of(cls, run: Run) -> Reading:
@@ -133,8 +134,8 @@ class Reading:
             outflows=tuple(medium.mass * n for n in outlets.removed) if outlets else (),
             runaways=int(run.motion.runaways),
             not_finite=int(run.motion.not_finite),
-            _born=born,
-            _start_fluids=run.start_fluids,
+            born=born,
+            start_fluids=run.start_fluids,
         )
 
     def read(self) -> Reading:
@@ -219,8 +220,8 @@ class Reading:
     @cached_property
     def fluids(self) -> np.ndarray:
         """Place of each particle's fluid in the scene, (N,), len(fluids) for what has flowed in."""
-        unborn = self._born - len(self._start_fluids)
-        return _held(np.pad(self._start_fluids, (0, unborn), constant_values=len(self.scene.fluids))[self.ids])
+        unborn = self.born - len(self.start_fluids)
+        return _held(np.pad(self.start_fluids, (0, unborn), constant_values=len(self.scene.fluids))[self.ids])
 
     # -- sums and extremes ------------------------------------------------------------------------------------------
 

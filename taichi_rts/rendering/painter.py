@@ -141,7 +141,7 @@ class Painter:
         x, tints = self.obstacles.add(now.local_positions, tints, now.time)
         images = [self.renderer.draw(x, tints, 0.5 * self.scene.spacing, each, outline) for each in self.cameras]
         image = self._joined(images) if len(images) > 1 else images[0]
-        return self._label(image, now) if self.options.legend else image
+        return self.label(image, now) if self.options.legend else image
 
     def _joined(self, images: list[np.ndarray]) -> np.ndarray:
         """Return all views in one picture, each with its name."""
@@ -150,10 +150,11 @@ class Painter:
             images = [legend.draw_legend(image, name, [], position="bottom-left") for image, name in named]
         return legend.hstack_panels(images)
 
-    def _label(self, image: np.ndarray, now: Reading) -> np.ndarray:
+    def label(self, image: np.ndarray, now: Reading) -> np.ndarray:
+        """Return a picture, (height, width, 3 or 4), with time, number of particles, legend and the bar of its colours."""
         mode = self.options.colour_by
         lines = [f"t = {now.time:.3f} s", f"Δt_b = {milliseconds(now.base_step)} ms", f"{now.count:,} particles"]
-        image = legend.draw_legend(image, self.title, self._entries(now), lines)
+        image = legend.draw_legend(image, self.title, self.entries(now), lines)
         if mode not in BARS:
             return image
         title, unit, factor = BARS[mode]
@@ -163,7 +164,7 @@ class Painter:
         upper = upper if upper > colours.LEAST_TOP else 0.0
         return legend.draw_colour_bar(image, title, factor * lower, factor * upper, unit, tints)
 
-    def _entries(self, now: Reading) -> list[tuple[str, Any, float]]:
+    def entries(self, now: Reading) -> list[tuple[str, Any, float]]:
         """One entry a colour of levels or fluids, with the share of particles that have it now; none in other modes."""
         palette = self.options.palette
         if self.options.colour_by == "fluid":

@@ -143,13 +143,13 @@ class LiveSession:
 
     def apply(self) -> None:
         """Go on with the settings that the sliders have, from the next frame but one on."""
-        stepper, viscosity = self._stepper(self.wanted, self.settings), self.wanted.viscosity
+        stepper, viscosity = self.stepper_for(self.wanted, self.settings), self.wanted.viscosity
         self._ask(lambda: self._switch(stepper, viscosity), f"compiling {stepper.name} steps ...")
 
     def _ask(self, action: Callable[[], object], message: str) -> None:
         self._asked, self.message = action, message
 
-    def _stepper(self, wanted: Settings, present: Settings) -> Any:
+    def stepper_for(self, wanted: Settings, present: Settings) -> Any:
         """Return the stepper of the `wanted` settings: the run's own where it has that name, with what differs changed."""
         base: Any = self.sim.stepper if wanted.stepper == present.stepper else self._by_name(wanted.stepper)
         changes: dict[str, Any] = {}

@@ -90,6 +90,7 @@ def test_momentum_is_accounted_for(run, stepper):
     assert max(run.drifts) < (1e-12 if stepper == "adaptive" else 0.005) * run.push
 
 
+@pytest.mark.slow  # as the next but two: they need a second run
 def test_the_centre_of_mass_moves_as_with_one_sound_speed(run, one_sound_speed):
     beside = np.abs(np.array(run.centres) - np.array(one_sound_speed.centres)).max()
     assert beside < 0.01 * DEPTH
@@ -108,6 +109,7 @@ def test_no_step_is_longer_than_its_own_sound_allows(run, stepper):
     assert max(run.courants) <= COURANT * 1.001
 
 
+@pytest.mark.slow
 def test_most_of_the_pool_is_spared_the_short_steps(run, stepper, one_sound_speed):
     saved = one_sound_speed.statistics["particle_updates"] / run.statistics["particle_updates"]
     # One step for all follows the splash. Measured: 0.63, 1.81, 1.66; without the slack of two (`solver/sound/rule.SLACK`)

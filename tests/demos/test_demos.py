@@ -31,7 +31,7 @@ END = {"martin_moyce": 0.02, "elliptical_drop": 0.0082, "oscillating_drop": 0.5}
 SCENE = {"asynchronous_dam_break": "dam_break"}  # demos that show a scene of another name
 
 
-QUICK = {"double_dam_break", "dam_break_2d"}
+QUICK = {"double_dam_break"}
 
 
 @pytest.mark.parametrize(

@@ -19,9 +19,9 @@ def options(*args: str) -> tuple[str, ...]:
     return (*DAM, *args)
 
 
-def missing(package: str, extra: str, args: tuple[str, ...], **more: Any) -> Row:
+def missing(package: str, extra: str, args: tuple[str, ...], *remedies: str, **more: Any) -> Row:
     """A command that needs a package which is not installed."""
-    words = (package.replace("_", "-"), f"pip install 'taichi_rts[{extra}]'")
+    words = (package.replace("_", "-"), f"pip install 'taichi_rts[{extra}]'", *remedies)
     return command(f"{package} not installed: {args[0]} {args[-1]}", args, *words, hidden=package, **more)
 
 
@@ -63,10 +63,7 @@ COMMANDS = [
         command(f"--levels {value}", options("--levels", value), "levels")
         for value in ("0", "-1", "1.5", "many", "100000")
     ),
-    *(
-        command(f"--particles {value}", options("--particles", value), value, "30k")
-        for value in ("many", "nan", "0", "-5", "1e12")
-    ),
+    command("--particles many", options("--particles", "many"), "many", "30k"),
     command(
         "more particles than memory",
         options("--particles", "500M", "--precision", "f64"),
@@ -80,22 +77,39 @@ COMMANDS = [
     ),
     command("--stagger -1", options("--stepper", "asynchronous", "--stagger", "-1"), "stagger"),
     command("--stagger 1e10", options("--stepper", "asynchronous", "--stagger", "10000000000"), "stagger"),
-    command("option of another stepper", options("--stepper", "uniform", "--levels", "3"), "--levels", "uniform"),
+    *(
+        command(f"{option} of another stepper", options("--stepper", "uniform", option, value), option, "uniform")
+        for option, value in (("--levels", "3"), ("--stagger", "1"), ("--limiter", "True"))
+    ),
+    command(
+        "panels and levels",
+        options("--panels", "figure3", "--levels", "3"),
+        "--panels figure3",
+        "--levels",
+        "leave out",
+    ),
     command(
         "panels and a stepper",
         options("--panels", "steppers", "--stepper", "uniform"),
         "--panels steppers",
         "leave out",
     ),
-    command("spacing and particles", options("--spacing", "0.1", "--particles", "1k"), "both given"),
+    command(
+        "spacing and particles",
+        options("--spacing", "0.1", "--particles", "1k"),
+        "particles '1k' and spacing 0.1 are both given; give one",
+    ),
+    command("one pixel", options("--width", "1"), "1 x 720"),
     command("spacing larger than a block", options("--spacing", "2"), "exceeds the shortest edge"),
     command("end before a frame", options("--export-fps", "1e7"), "export_fps"),
     command(
         "too many frames", options("--end-time", "2", "--export-fps", "1e6"), "frames", "use an export_fps of at most"
     ),
     command("too many checkpoints", options("--checkpoint-every", "1e-9"), "checkpoints", "use at least"),
-    command("unknown scene", ("run", "no_such_scene"), "no_such_scene", "choose one of"),
-    command("missing scene file", ("run", "none.toml"), "none.toml", "check the path"),
+    command(
+        "unknown scene", ("run", "no_such_scene"), "'no_such_scene' is unknown; choose one of dam_break, dam_break_2d"
+    ),
+    command("missing scene file", ("run", "none.toml"), "none.toml' cannot be read: No such file", "check the path"),
     command("scene file that is a folder", ("run", "folder.toml"), "folder.toml", "check the path"),
     command("unknown extension", ("run", "scene.yaml"), "scene.yaml", "name a .toml file"),
     command("unknown option", options("--nonsense"), "nonsense"),
@@ -104,13 +118,38 @@ COMMANDS = [
     command("unknown arch", options("--arch", "tpu"), "tpu"),
     command("arch missing", ("run", "dam_break_2d", "--arch", "cuda", "--output-dir", "out"), "cuda", "use --arch cpu"),
     command("unknown precision", options("--precision", "f16"), "f16"),
-    command("unknown colours", options("--colour-by", "age"), "age"),
+    command("unknown colours", options("--colour-by", "age"), "age", "lead"),
     command("unknown format", options("--export", "vtk"), "'vtk' is no format", "did you mean 'vtu'"),
     command("unknown attribute", options("--export", "vtu", "--attributes", "mood"), "'mood' is no attribute"),
-    command("attributes of nothing", options("--attributes", "id"), "nothing is exported"),
-    command("surface in two dimensions", options("--export", "surface"), "3 dimensions", "leave it out"),
+    command(
+        "misspelt attribute",
+        options("--export", "vtu", "--attributes", "presure"),
+        "'presure'",
+        "did you mean 'pressure'",
+    ),
+    command("attributes of nothing", options("--attributes", "id"), "--attributes", "--export", "nothing is exported"),
+    command(
+        "surface in two dimensions",
+        options("--export", "surface"),
+        "surface needs a scene in 3 dimensions",
+        "leave it out",
+    ),
     command("video without pictures", options("--no-frames", "--video"), "--no-frames", "leave out one"),
-    command("window and debug", options("--gui", "--debug"), "--gui", "leave out"),
+    command("film without pictures", options("--no-frames", "--gif"), "--no-frames", "--gif"),
+    command(
+        "files of several runs", options("--panels", "steppers", "--export", "ply"), "--export", "one run", "--panels"
+    ),
+    command("window and debug", options("--gui", "--debug"), "--gui", "leave out --debug, or"),
+    command(
+        "window and views",
+        options("--gui", "--views", "top", "--quality", "best"),
+        "leave out --views, --quality, or",
+    ),
+    command(
+        "window and no pictures",
+        options("--gui", "--transparent", "--no-frames"),
+        "leave out --no-frames, --transparent, or",
+    ),
     command(
         "output exists",
         ("run", "dam_break_2d", "--arch", "cpu", "--output-dir", "earlier"),
@@ -143,15 +182,56 @@ COMMANDS = [
         "no whole checkpoint",
         "start the run again",
     ),
-    command("compare: no such stepper", ("compare", "--steppers", "leapfrog", "--output-dir", "out"), "leapfrog"),
-    command("compare: courants", ("compare", "--courants", "0.4,many", "--output-dir", "out"), "many"),
+    command(
+        "compare: no such stepper",
+        ("compare", "--steppers", "regionl", "--output-dir", "out"),
+        "regionl",
+        "did you mean regional",
+    ),
+    command("compare: no such key", ("compare", "--set", "alpa=0.1", "--output-dir", "out"), "did you mean alpha"),
+    command("compare: levels", ("compare", "--levels", "2,x", "--output-dir", "out"), "levels", "x"),
+    command("compare: no such error", ("compare", "--error", "colour", "--output-dir", "out"), "colour", "velocities"),
+    command("compare: courants", ("compare", "--courants", "0.4,many", "--output-dir", "out"), "--courants", "many"),
+    command(
+        "compare: resume and overwrite",
+        ("compare", "--resume", "--overwrite", "--output-dir", "out"),
+        "--resume",
+        "--overwrite",
+    ),
     command("compare: courant NaN", ("compare", "--courants", "nan", "--output-dir", "out"), "nan"),
     command("compare: 0 samples", ("compare", "--samples", "0", "--output-dir", "out"), "samples"),
     command("compare: 0 repeats", ("compare", "--repeats", "0", "--output-dir", "out"), "repeats"),
     command("compare: 0 workers", ("compare", "--workers", "0", "--output-dir", "out"), "workers"),
     command("compare: end NaN", ("compare", "--end-time", "nan", "--output-dir", "out"), "end_time"),
     command("compare: output is a file", ("compare", "--output-dir", "drops.csv"), "is a file", "choose another"),
-    command("stability: no such case", ("stability", "--cases", "calm", "--output-dir", "out"), "calm"),
+    command(
+        "stability: no such case",
+        ("stability", "--cases", "pistn", "--output-dir", "out"),
+        "'pistn'",
+        "did you mean 'piston'",
+        "known",
+    ),
+    command(
+        "stability: no such stepper",
+        ("stability", "--steppers", "rk4", "--output-dir", "out"),
+        "'rk4'",
+        "asynchronous_integers",
+    ),
+    command("stability: tolerance 0", ("stability", "--tolerance", "0", "--output-dir", "out"), "tolerance 0", "0.001"),
+    command(
+        "stability: resume and overwrite",
+        ("stability", "--resume", "--overwrite", "--output-dir", "out"),
+        "--resume",
+        "--overwrite",
+    ),
+    command("stability: unknown arch", ("stability", "--arch", "tpu", "--output-dir", "out"), "tpu"),
+    command(
+        "bench: no such part",
+        ("bench", "--rows", "peer", "speed"),
+        "--rows speed: no such part of the table; choose any of peer, second",
+    ),
+    command("bench: scale 0", ("bench", "--scale", "0"), "--scale 0: must be above 0 and at most 4"),
+    command("bench: 0 repeats", ("bench", "--repeats", "0"), "--repeats 0: must be 1 to 100"),
     command("stability: tolerance NaN", ("stability", "--tolerance", "nan", "--output-dir", "out"), "tolerance"),
     command("stability: 0 workers", ("stability", "--workers", "0", "--output-dir", "out"), "workers"),
     command("stability: output is a file", ("stability", "--output-dir", "drops.csv"), "is a file", "choose another"),
@@ -162,6 +242,6 @@ COMMANDS = [
     ),
     missing("trimesh", "mesh", RUN, scene=NEW_MESH),
     missing("matplotlib", "plots", ("compare", "--output-dir", "out")),
-    missing("matplotlib", "plots", ("stability", "--output-dir", "out")),
+    missing("matplotlib", "plots", ("stability", "--output-dir", "out"), "--no-plot"),
     missing("distributed", "cluster", ("compare", "--output-dir", "out", "--no-plot", "--dask", "local")),
 ]

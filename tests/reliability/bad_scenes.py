@@ -109,7 +109,11 @@ SCENES = [
         "gravity (0.0, 0.0, -9.81) has 3 components; the domain has 2",
     ),
     scene("unknown key", with_parts(TANK, spacin=1.0), "spacin: unknown key", "did you mean 'spacing'"),
-    scene("a number with a unit", with_parts(TANK, spacing="0.1 m"), "spacing", "plain number", "0.1 m"),
+    scene(
+        "a number with a unit",
+        with_parts(TANK, spacing="0.1 m"),
+        "spacing: '0.1 m' is a text; give a plain number in SI units, 0.1",
+    ),
     scene("a number in quotes", with_parts(TANK, spacing="0.1"), "spacing", "valid number"),
     scene("true for a number", with_parts(TANK, spacing=True), "spacing", "valid number"),
     scene(
@@ -157,12 +161,12 @@ SCENES = [
     scene(
         "times that descend",
         with_parts(TANK, moving_walls=[{"face": "x+", "times": [0.5, 0.0], "displacements": [0.0, -0.1]}]),
-        "must ascend",
+        "times (0.5, 0.0) must ascend",
     ),
     scene(
         "a piston that closes the domain",
         with_parts(TANK, moving_walls=[{"face": "x+", "times": [0.0, 1.0], "displacements": [0.0, -1.0]}]),
-        "would close the domain",
+        "moving_walls.0: 'x+' would close the domain",
     ),
     scene(
         "a piston as fast as light",
@@ -177,7 +181,11 @@ SCENES = [
         with_parts(TANK, moving_walls=[{"face": "z+", "times": [0.0, 1.0], "displacements": [0.0, -0.1]}]),
         "no wall 'z+'",
     ),
-    scene("a periodic axis that does not exist", with_parts(TANK, periodic=["z"]), "axis 'z' does not exist"),
+    scene(
+        "a periodic axis that does not exist",
+        with_parts(TANK, periodic=["z"]),
+        "periodic: axis 'z' does not exist in two dimensions",
+    ),
     scene(
         "probe outside the domain", with_parts(TANK, probes=[{"position": [2.0, 0.1]}]), "outside the domain", "move it"
     ),
@@ -209,9 +217,15 @@ SCENES = [
         with_parts(TANK, obstacles=[{"shape": "box", "lower": [0.0, 0.0], "upper": [0.6, 0.6]}]),
         "fluids.0: lies wholly inside obstacles.0; move or shrink one",
     ),
-    scene("mesh open", mesh("open.obj"), "is open", "close its holes"),
+    scene("mesh open", mesh("open.obj"), "obstacles.0: ", "is open: 3 of its edges", "close its holes"),
     scene("mesh missing", mesh("none.obj"), "does not exist", "check the path"),
-    scene("mesh inside out", mesh("inside_out.obj"), "inside out", "flip its normals"),
+    scene(
+        "mesh inside out",
+        mesh("inside_out.obj"),
+        "obstacles.0: ",
+        "is inside out: its volume is -",
+        "flip its normals",
+    ),
     scene("mesh of an unknown format", mesh("drops.csv"), "no OBJ, STL or PLY", "convert it"),
     scene("mesh that is something else", mesh("broken.obj"), "broken.obj", "export"),
     scene("mesh that is a folder", mesh("folder.obj"), "does not exist", "check the path"),
@@ -219,10 +233,23 @@ SCENES = [
     scene("mesh by an absolute path", mesh("/etc/passwd"), "leaves the scene's folder", "put it there"),
     scene("mesh by a link out of the folder", mesh("link.obj"), "leaves the scene's folder", "put it there"),
     scene("mesh with a zero byte in its name", mesh("a\0b.obj"), "leaves the scene's folder"),
-    scene("particles missing", with_parts(BOX, fluids=[{"file": "none.csv"}]), "cannot be read", "check the path"),
+    scene(
+        "particles missing",
+        with_parts(BOX, fluids=[{"file": "none.csv"}]),
+        "fluids.0: particle file ",
+        "none.csv' cannot be read",
+        "check the path",
+    ),
     scene(
         "particles above the scene's folder",
         with_parts(BOX, fluids=[{"file": "../drops.csv"}]),
+        "fluids.0.file: ",
+        "leaves the scene's folder",
+    ),
+    scene(
+        "particles by an absolute path",
+        with_parts(BOX, fluids=[{"file": "/etc/drops.csv"}]),
+        "fluids.0.file: ",
         "leaves the scene's folder",
     ),
     scene(

@@ -13,6 +13,26 @@ from taichi_rts.scene.checks.size import MOST, finest_spacing, size_of
 CPU = Backend("cpu", "f32")
 
 
+STEPPERS = {"uniform": rts.Uniform(), "regional": rts.Regional(), "asynchronous": rts.Asynchronous()}
+SCENES = {
+    "dam_break": "uniform",
+    "dam_break_2d": "regional",
+    "dam_break_obstacle": "asynchronous",
+    "water_jet": "regional",
+    "projectile": "asynchronous",
+}
+"""With the stepper that is not left to the slow tests."""
+
+every_scene_and_stepper = pytest.mark.parametrize(
+    ("name", "stepper"),
+    [
+        pytest.param(name, stepper, id=f"{name}-{key}", marks=[] if key == quick else pytest.mark.slow)
+        for name, quick in SCENES.items()
+        for key, stepper in STEPPERS.items()
+    ],
+)
+
+
 @pytest.fixture
 def allocated(monkeypatch):
     """Bytes of all fields that are made, as a list of one number a field."""
@@ -36,8 +56,7 @@ def allocated(monkeypatch):
     return found
 
 
-@pytest.mark.parametrize("name", ["dam_break", "dam_break_2d", "dam_break_obstacle", "water_jet", "projectile"])
-@pytest.mark.parametrize("stepper", [rts.Uniform(), rts.Regional(), rts.Asynchronous()], ids=lambda each: each.name)
+@every_scene_and_stepper
 def test_the_estimate_is_never_less_and_a_fifth_more_at_most(name, stepper, allocated, unstarted, start_taichi):
     changes = {"projectile": {"sound_speed": "regional"}, "dam_break_obstacle": {"support_ratio": 3.0}}
     scene = rts.load_scene(name, **changes.get(name, {}))
@@ -119,8 +138,7 @@ def buffers(monkeypatch):
     return found
 
 
-@pytest.mark.parametrize("name", ["dam_break", "dam_break_2d", "dam_break_obstacle", "water_jet", "projectile"])
-@pytest.mark.parametrize("stepper", [rts.Uniform(), rts.Regional(), rts.Asynchronous()], ids=lambda each: each.name)
+@every_scene_and_stepper
 def test_no_buffer_of_a_graphics_device_is_larger_than_is_said(
     name, stepper, buffers, unstarted, start_taichi, monkeypatch
 ):

@@ -6,7 +6,7 @@ import pytest
 
 import taichi_rts as rts
 from taichi_rts.commands.main import main
-from taichi_rts.stability import chart, command, suite
+from taichi_rts.stability import command, suite
 from taichi_rts.stability.cases import CASES, Case
 
 pytestmark = pytest.mark.usefixtures("quick_environment")
@@ -110,27 +110,6 @@ def test_a_stop_keeps_what_is_done(call, monkeypatch):
     assert len(data["cells"]) == 1
 
 
-@pytest.mark.parametrize(
-    ("args", "words"),
-    [
-        (["--cases", "pistn"], ["'pistn'", "did you mean 'piston'", "known"]),
-        (["--steppers", "rk4"], ["'rk4'", "asynchronous_integers"]),
-        (["--tolerance", "0"], ["tolerance 0", "0.001"]),
-        (["--workers", "0"], ["workers 0", "1"]),
-        (["--resume", "--overwrite"], ["--resume", "--overwrite"]),
-        (["--arch", "tpu"], ["tpu"]),
-    ],
-)
-def test_bad_input_is_one_message_and_exit_code_2(args, words, tmp_path, capsys):
-    with pytest.raises(SystemExit) as stop:
-        main(["stability", *args, "--output-dir", str(tmp_path / "out")])
-    assert stop.value.code == 2
-    captured = capsys.readouterr()
-    for word in words:
-        assert word in captured.err + captured.out
-    assert not (tmp_path / "out").exists()
-
-
 def test_an_earlier_map_is_kept(tmp_path, capsys):
     (tmp_path / "stability.json").write_text("{}")
     with pytest.raises(SystemExit) as stop:
@@ -138,12 +117,6 @@ def test_an_earlier_map_is_kept(tmp_path, capsys):
     assert stop.value.code == 2
     assert "--resume or --overwrite" in capsys.readouterr().err
     assert (tmp_path / "stability.json").read_text() == "{}"
-
-
-def test_without_matplotlib_there_is_one_clear_message(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
-    with pytest.raises(rts.Error, match=r"taichi_rts\[plots\].*--no-plot"):
-        chart.require_matplotlib()
 
 
 def test_every_case_is_a_small_scene():
@@ -155,6 +128,7 @@ def test_every_case_is_a_small_scene():
         assert sum(fluid.volume for fluid in scene.fluids) / scene.spacing**scene.dim <= 600
 
 
+@pytest.mark.slow
 def test_several_workers_share_the_cases(call):
     folder, _ = call("--quick", "--workers", "2")
     cells = json.loads((folder / "stability.json").read_text())["cells"]

@@ -20,7 +20,14 @@ UNIT = rts.Box((0, 0), (1, 1))
 TICK = math.pi * 2.5e-5  # [s]
 ROUNDING = 2.0**-24
 RUN = 500  # steps in a row
-LATER = pytest.mark.parametrize("begin", [10.0, 3600.0, 50_000.0], ids=["10 s", "an hour", "fourteen hours"])
+LATER = pytest.mark.parametrize(
+    "begin",
+    [
+        pytest.param(10.0, id="10 s"),
+        pytest.param(3600.0, id="an hour", marks=pytest.mark.slow),
+        pytest.param(50_000.0, id="fourteen hours"),
+    ],
+)
 NUMBERS = pytest.mark.parametrize("precision", ["f32", "f64"])
 
 

@@ -65,6 +65,7 @@ WAVES = {"regional": (0.020, -0.013), "uniform": (0.036, -0.008), "asynchronous"
 """Errors of period and crest of the standing wave, measured."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stepper", ["regional", *LONG])
 def test_standing_wave(errors, stepper):
     """Ten particles deep; steppers scatter by more than at the docs' size, so each has its own bounds.
@@ -83,7 +84,8 @@ def test_torricelli(errors, stepper):
     assert -0.1 < errors("torricelli", stepper)["jet"] < -0.05  # measured -0.078; gravity times 1.1 moves it by 0.05
 
 
-@pytest.mark.parametrize("stepper", ["uniform", pytest.param("paper", marks=pytest.mark.slow)])
+@pytest.mark.slow  # the quick one is Martin and Moyce's column
+@pytest.mark.parametrize("stepper", ["uniform", "paper"])
 def test_koshizuka_oka(errors, stepper):
     found = errors("koshizuka_oka", stepper)
     assert found["front"] < 0.07  # measured 0.051, 0.048

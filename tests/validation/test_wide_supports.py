@@ -23,7 +23,7 @@ def rest(dim, ratio, kernel, density, end):
     return sim
 
 
-@pytest.mark.parametrize("density", ["summation", "continuity"])
+@pytest.mark.parametrize("density", ["summation", pytest.param("continuity", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("dim", "ratio", "kernel", "end"),
     [

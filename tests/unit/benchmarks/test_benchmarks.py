@@ -9,7 +9,6 @@ from taichi_rts.benchmarks.memory import memory_of
 from taichi_rts.benchmarks.plot import draw
 from taichi_rts.benchmarks.rows import Row, Settings, millions
 from taichi_rts.benchmarks.scenes import peers_dam_break
-from taichi_rts.commands.main import main
 
 
 def test_a_step_with_few_due_is_read_off_a_line_that_disturbed_steps_do_not_bend():
@@ -24,21 +23,6 @@ def test_verdicts_go_by_the_bar():
     bars = [("", ""), (">= 6", "yes"), (">= 6.1", "no"), ("<= 6", "yes"), ("<= 5.9", "no")]
     assert [verdict(Row("", "", 6.0, "x", bar)) for bar, _ in bars] == [wanted for _, wanted in bars]
     assert [millions(n) for n in (31_400, 1_520_000)] == ["31k", "1.52M"]
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--rows", "peer", "speed"], "--rows speed: no such part of the table; choose any of peer, second"),
-        (["--scale", "0"], "--scale 0: must be above 0 and at most 4"),
-        (["--repeats", "0"], "--repeats 0: must be 1 to 100"),
-    ],
-)
-def test_bad_options_are_one_error(options, message, capsys):
-    with pytest.raises(SystemExit) as stop:
-        main(["bench", *options])
-    assert stop.value.code == 2
-    assert message in capsys.readouterr().err
 
 
 def test_memory_counts_every_field_once(taichi_cpu, unstarted):

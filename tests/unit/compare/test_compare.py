@@ -54,6 +54,7 @@ def check_rewind(stepper):
     assert runs[1][1]["wall_seconds"] > 0.0
 
 
+@pytest.mark.slow  # its parts have quick tests of their own
 def test_a_comparison_from_the_command_line(tmp_path, capsys, quick_jobs, monkeypatch):
     args = ["compare", "dam_break_2d", *SIZE, "--steppers", "uniform,regional", "--courants", "0.4"]
     args += ["--cache-dir", str(tmp_path / "cache"), "--output-dir", str(tmp_path / "out")]
@@ -123,41 +124,6 @@ def test_here_and_plain_futures_are_executors():
         collect(executor, [Task(str(n), 1.0, abs, -n) for n in range(3)], begun.append, found.__setitem__)
         assert found == {0: 0, 1: 1, 2: 2}
         assert begun[:1] == ["0"]
-
-
-@pytest.mark.parametrize(
-    ("args", "words"),
-    [
-        (["no_such_scene"], ["no_such_scene", "dam_break_2d"]),
-        (["dam_break_2d", "--steppers", "regionl"], ["regionl", "did you mean regional"]),
-        (["dam_break_2d", "--set", "alpa=0.1"], ["alpa", "did you mean alpha"]),
-        (["dam_break_2d", "--set", "regional.levels=two"], ["levels", "two"]),
-        (["dam_break_2d", "--levels", "2,x"], ["levels", "x"]),
-        (["dam_break_2d", "--courants", "0.4,many"], ["--courants", "many"]),
-        (["dam_break_2d", "--error", "colour"], ["colour", "velocities"]),
-        (["dam_break_2d", "--workers", "0"], ["--workers", "0"]),
-        (["dam_break_2d", "--repeats", "0"], ["repeats", "0"]),
-        (["dam_break_2d", "--resume", "--overwrite"], ["--resume", "--overwrite"]),
-    ],
-)
-def test_bad_input_is_one_message_and_exit_code_2(args, words, tmp_path, capsys):
-    with pytest.raises(SystemExit) as stop:
-        main(["compare", *args, "--output-dir", str(tmp_path / "out")])
-    assert stop.value.code == 2
-    captured = capsys.readouterr()
-    for word in words:
-        assert word in captured.err + captured.out
-    assert "Traceback" not in captured.err
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_missing_extra_is_named_before_anything_runs(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    for args, words in (([], "taichi_rts[plots]"), (["--no-plot", "--dask", "local"], "taichi_rts[cluster]")):
-        with pytest.raises(SystemExit):
-            main(["compare", "dam_break_2d", *args, "--output-dir", str(tmp_path / "out")])
-        assert words in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_reference_that_does_not_survive_is_an_error(tmp_path, monkeypatch):

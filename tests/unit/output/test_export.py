@@ -98,43 +98,17 @@ def test_what_cannot_be_written_is_said_before_anything_is(tmp_path):
         Exporter(tmp_path, ["vtu"], ["speeed"])
 
 
-@pytest.mark.parametrize(
-    ("name", "package", "extra"), [("vtkhdf", "h5py", "hdf"), ("surface", "pysplashsurf", "surface")]
-)
-def test_a_missing_extra_is_named(monkeypatch, tmp_path, name, package, extra):
-    monkeypatch.setattr("importlib.util.find_spec", lambda package: None)
-    with pytest.raises(
-        rts.OutputError, match=rf"needs the package {package}; run: pip install 'taichi_rts\[{extra}\]'"
-    ):
-        Exporter(tmp_path, [name])
-
-
-@pytest.mark.parametrize(
-    ("args", "words"),
-    [
-        (["--export", "obj"], ["'obj' is no format", "vtu"]),
-        (["--export", "vtu", "--attributes", "presure"], ["'presure' is no attribute", "did you mean 'pressure'"]),
-        (["--attributes", "id"], ["--attributes", "--export"]),
-        (["--no-frames", "--gif"], ["--no-frames", "--gif"]),
-        (["--gui", "--export", "ply"], ["--gui", "--export"]),
-        (["--panels", "steppers", "--export", "ply"], ["--export", "one run", "--panels"]),
-    ],
-)
-def test_bad_options_are_one_message(args, words, tmp_path, capsys):
+def test_bad_options_are_one_message(tmp_path, capsys):
     with pytest.raises(SystemExit) as stop:
-        main(["run", "dam_break_2d", "--arch", "cpu", *args, "--output-dir", str(tmp_path / "out")])
+        main(
+            ["run", "dam_break_2d", "--arch", "cpu", "--gui", "--export", "ply", "--output-dir", str(tmp_path / "out")]
+        )
     assert stop.value.code == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
-    for word in words:
-        assert word in said
+    assert "--gui" in said
+    assert "--export" in said
     assert not (tmp_path / "out").exists()
-
-
-def test_a_surface_needs_three_dimensions(tmp_path):
-    pytest.importorskip("pysplashsurf")
-    with pytest.raises(rts.OutputError, match="surface needs a scene in 3 dimensions, this one has 2"):
-        Exporter(tmp_path, ["surface"], dim=2)
 
 
 def test_core_imports_no_extra():

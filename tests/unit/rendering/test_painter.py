@@ -42,13 +42,13 @@ def reading(level, count=1, *, doubling=False, density=None, scene=SCENE, tick=0
         outflows=(),
         runaways=0,
         not_finite=0,
-        _born=4,
-        _start_fluids=np.zeros(4, int),
+        born=4,
+        start_fluids=np.zeros(4, int),
     )
 
 
 def entries(now):
-    return Painter(SCENE, PictureOptions(), renderer=NOTHING)._entries(now)
+    return Painter(SCENE, PictureOptions(), renderer=NOTHING).entries(now)
 
 
 def test_regional_levels_have_an_entry_each():
@@ -96,7 +96,7 @@ def test_steps_and_leads_are_coloured_up_to_the_longest_there_can_be(mode, value
     assert np.allclose(got, scalar_colours(values, 0, top))
     bars = []
     monkeypatch.setattr(legend, "draw_colour_bar", lambda image, *bar: bars.append(bar) or image)
-    painter._label(np.zeros((360, 640, 3), np.uint8), now)
+    painter.label(np.zeros((360, 640, 3), np.uint8), now)
     title, lower, upper, unit, _ = bars[0]
     assert title == {"step": "step", "lead": "ahead of the youngest"}[mode]
     assert (lower, upper, unit) == (0.0, pytest.approx(0.5 * top), "ms")
@@ -158,7 +158,7 @@ def test_text_and_panels_are_three_times_as_large_in_4k():
     for height in (720, 2160):
         painter = Painter(SCENE, PictureOptions(height=height), renderer=NOTHING)
         blank = np.full((height, height * 16 // 9, 4), (9, 9, 9, 0), np.uint8)
-        rows, columns = np.nonzero(painter._label(blank, now)[..., 3])
+        rows, columns = np.nonzero(painter.label(blank, now)[..., 3])
         sizes.append((np.ptp(rows), np.ptp(columns)))
     assert np.divide(*sizes[::-1]) == pytest.approx(3, rel=0.05)
 

@@ -13,9 +13,11 @@ FRONT = Camera((0, 0, 10), (0, 0, 0), field_of_view=30.0)
 RED, BLUE, GREY = (0.9, 0.1, 0.1), (0.1, 0.1, 0.9), (0.5, 0.5, 0.5)
 
 
-@pytest.fixture
-def splatter(taichi_cpu):
-    return Splatter(WIDTH, HEIGHT, supersample=2)
+@pytest.fixture(scope="module")
+def splatter(start_taichi, quick):
+    """One for all tests but the last, which start Taichi anew."""
+    with start_taichi("cpu", "f32", **quick):
+        yield Splatter(WIDTH, HEIGHT, supersample=2)
 
 
 def covered(picture):
@@ -72,12 +74,11 @@ def test_two_draws_give_the_same_bits_even_with_ties(splatter):
 
 def test_number_of_particles_may_change(splatter):
     positions, colours = cloud(2000)
-    fresh = {}
-    for count in (2000, 1, 500, 0):
-        fresh[count] = Splatter(WIDTH, HEIGHT).draw(positions[:count], colours[:count], 0.1, FRONT)
+    fresh = Splatter(WIDTH, HEIGHT).draw(positions[:500], colours[:500], 0.1, FRONT)
     for count in (1, 500, 2000, 0, 500):
-        assert np.array_equal(splatter.draw(positions[:count], colours[:count], 0.1, FRONT), fresh[count]), count
-    assert not covered(fresh[0]).any()
+        drawn = splatter.draw(positions[:count], colours[:count], 0.1, FRONT)
+        assert count != 500 or np.array_equal(drawn, fresh)
+        assert covered(drawn).any() == (count > 0)
 
 
 def test_what_is_behind_beside_or_not_a_number_draws_nothing(splatter):
@@ -94,7 +95,7 @@ def test_colour_survives_the_light(splatter):
     assert mean[2] < 0.35
 
 
-def test_background(taichi_cpu):
+def test_background(splatter):
     picture = Splatter(32, 24, background=(0.2, 0.4, 0.6)).draw(np.zeros((0, 3)), np.zeros((0, 3)), 1.0, FRONT)
     assert np.all(picture == (51, 102, 153))
 
@@ -147,13 +148,13 @@ def test_a_block_is_darker_under_one_that_floats_above_it(splatter):
 
 
 @pytest.mark.parametrize(("quality", "shades"), [("draft", 0), ("good", 3), ("best", 8)])
-def test_edges_have_intermediate_values(taichi_cpu, quality, shades):
+def test_edges_have_intermediate_values(splatter, quality, shades):
     camera = Camera((0, 0, 10), (0, 0, 0), field_of_view=30.0)
-    splatter = Splatter(WIDTH, HEIGHT, quality=quality, transparent=True)
-    alpha = splatter.draw(np.zeros((1, 3)), np.array([GREY]), 1.5, camera)[..., 3]
+    clear = Splatter(WIDTH, HEIGHT, quality=quality, transparent=True)
+    alpha = clear.draw(np.zeros((1, 3)), np.array([GREY]), 1.5, camera)[..., 3]
     between = np.unique(alpha[(alpha > 0) & (alpha < 255)])
     assert len(between) >= shades
-    assert len(between) < splatter.supersample**2
+    assert len(between) < clear.supersample**2
     assert alpha.sum() / 255 == pytest.approx(np.pi * (1.5 * camera.focal_pixels(HEIGHT) / 10) ** 2, rel=0.02)
 
 
@@ -196,26 +197,6 @@ def test_plane_positions_are_discs(splatter):
     assert np.ptp(rows) == pytest.approx(0.6 * camera.focal_pixels(HEIGHT), abs=2)
 
 
-def test_default_precision_of_the_run_does_not_matter(taichi_cpu, tmp_path):
-    positions, colours = cloud(500)
-    single = Splatter(WIDTH, HEIGHT).draw(positions, colours, 0.1, FRONT).astype(int)
-    ti.reset()
-    ti.init(arch=ti.cpu, default_fp=ti.f64, offline_cache_file_path=str(tmp_path), log_level=ti.ERROR)
-    double = Splatter(WIDTH, HEIGHT).draw(positions, colours, 0.1, FRONT).astype(int)
-    assert (np.abs(single - double).max(axis=2) > 2).mean() < 1e-3
-
-
-def test_vulkan_draws_what_the_processor_draws(start_taichi):
-    if not backend.vulkan_device_types():
-        pytest.skip("no Vulkan driver on this machine")
-    positions, colours = cloud(60)
-    box, pictures = ((-1.5,) * 3, (1.5,) * 3), []
-    for arch in ("cpu", "vulkan"):
-        with start_taichi(arch):
-            pictures.append(Splatter(WIDTH, HEIGHT).draw(positions, colours, 0.2, FRONT, box).astype(int))
-    assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 2).mean() < 1e-3
-
-
 def test_tables_are_inverse():
     values = np.linspace(0, 1, 256)
     assert np.allclose(linear_to_srgb(srgb_to_linear(values)), values, atol=1e-6)
@@ -243,3 +224,23 @@ def test_unknown_quality_is_refused():
 def test_impossible_pictures_are_refused():
     with pytest.raises(RenderError, match="supersample = 9"):
         Splatter(64, 64, supersample=9)
+
+
+def test_default_precision_of_the_run_does_not_matter(taichi_cpu, tmp_path):
+    positions, colours = cloud(500)
+    single = Splatter(WIDTH, HEIGHT).draw(positions, colours, 0.1, FRONT).astype(int)
+    ti.reset()
+    ti.init(arch=ti.cpu, default_fp=ti.f64, offline_cache_file_path=str(tmp_path), log_level=ti.ERROR)
+    double = Splatter(WIDTH, HEIGHT).draw(positions, colours, 0.1, FRONT).astype(int)
+    assert (np.abs(single - double).max(axis=2) > 2).mean() < 1e-3
+
+
+def test_vulkan_draws_what_the_processor_draws(start_taichi):
+    if not backend.vulkan_device_types():
+        pytest.skip("no Vulkan driver on this machine")
+    positions, colours = cloud(60)
+    box, pictures = ((-1.5,) * 3, (1.5,) * 3), []
+    for arch in ("cpu", "vulkan"):
+        with start_taichi(arch):
+            pictures.append(Splatter(WIDTH, HEIGHT).draw(positions, colours, 0.2, FRONT, box).astype(int))
+    assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 2).mean() < 1e-3

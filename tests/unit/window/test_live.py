@@ -30,7 +30,7 @@ def press(session, *keys):
 
 
 def test_keys_pause_step_reset_colour_and_clip(session, tmp_path):
-    step = session.sim.base_step
+    step, start = session.sim.base_step, session.sim.positions()
     session.advance()
     assert session.sim.time == pytest.approx(4 * step)
     assert 0.0 < session.active <= 1.0
@@ -61,8 +61,7 @@ def test_keys_pause_step_reset_colour_and_clip(session, tmp_path):
     assert len(session.view().positions) == 75
     press(session, "r", "~")
     assert session.sim.time == 0.0
-    fresh = rts.Simulation(SCENE, PAPER)
-    np.testing.assert_array_equal(session.sim.positions(), fresh.positions())
+    np.testing.assert_array_equal(session.sim.positions(), start)
     assert not list(tmp_path.iterdir())  # nothing is written unasked
 
 
@@ -117,21 +116,24 @@ def test_steppers_and_sliders_change_the_run_and_not_the_fluid(session):
     session.advance()
     assert session.sim.stepper == PAPER  # the run's own, not the default
     session.wanted = replace(session.settings, levels=2)
-    stepper = session._stepper(session.wanted, session.settings)
+    stepper = session.stepper_for(session.wanted, session.settings)
     assert stepper == replace(PAPER, levels=2)
     session.wanted = replace(session.settings, courant=0.9)
-    assert session._stepper(session.wanted, session.settings).courant == pytest.approx(0.3)  # of three levels
+    assert session.stepper_for(session.wanted, session.settings).courant == pytest.approx(0.3)  # of three levels
     asynchronous = replace(session.settings, stepper="asynchronous", levels=5)
-    assert session._stepper(asynchronous, session.settings).levels == 4  # a power of two
+    assert session.stepper_for(asynchronous, session.settings).levels == 4  # a power of two
 
 
-def test_recordings_are_numbered_and_end_with_a_film(session, tmp_path, monkeypatch):
+def test_recordings_are_numbered_and_end_with_a_film_the_plot_follows_and_a_blow_up_pauses(
+    session, tmp_path, monkeypatch
+):
     camera = Camera.framing(*OUTLINE, aspect=4 / 3)
     press(session, "v")
     for _ in range(3):
         session.advance()
         for _ in range(2):  # without a step nothing is added
             session.capture(camera, OUTLINE, session.entries(), session.lines())
+    check_that_the_plot_stacks_shares_of_levels(session)
     press(session, "v")
     folder = tmp_path / "window" / "recording-001"
     assert session.message.startswith(f"3 frames in {folder}")
@@ -149,21 +151,11 @@ def test_recordings_are_numbered_and_end_with_a_film(session, tmp_path, monkeypa
     press(session, "v", "v")
     assert "0 frames in" in session.message
     assert session.message.endswith("recording-002; no video: --video needs the package imageio-ffmpeg")
+    check_that_a_blow_up_pauses_and_says_why(session, monkeypatch)
 
 
-def test_a_blow_up_pauses_and_says_why(session, monkeypatch):
-    def burst(time):
-        raise rts.SimulationDivergedError("3 particle states are no longer finite; use a smaller courant")
-
-    monkeypatch.setattr(session.sim, "advance_to", burst)
-    session.advance()
-    assert session.paused
-    assert "use a smaller courant" in session.message
-
-
-def test_the_plot_stacks_shares_of_levels(session):
-    for _ in range(3):
-        session.advance()
+def check_that_the_plot_stacks_shares_of_levels(session):
+    """After three frames."""
     corners, shades = live.share_plot(session, 400, 300)
     assert corners.shape == (6 * (1 + 3 * 4), 2) == (len(shades), 2)  # a ground, and 3 levels at 4 times
     assert corners.min() > 0.0
@@ -173,6 +165,16 @@ def test_the_plot_stacks_shares_of_levels(session):
     whole = 4 / 96 * live.PLOT_WIDTH * live.PLOT_HEIGHT / (400 * 300)
     assert areas.sum() == pytest.approx(whole)
     assert areas.reshape(3, 4).sum(axis=1) / whole == pytest.approx(np.mean(list(session.history), axis=0))
+
+
+def check_that_a_blow_up_pauses_and_says_why(session, monkeypatch):
+    def burst(time):
+        raise rts.SimulationDivergedError("3 particle states are no longer finite; use a smaller courant")
+
+    monkeypatch.setattr(session.sim, "advance_to", burst)
+    session.advance()
+    assert session.paused
+    assert "use a smaller courant" in session.message
 
 
 class Window:

@@ -32,7 +32,6 @@ def scene(**changes):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"periodic": ("z",)}, "periodic: axis 'z' does not exist in two dimensions"),
         ({"periodic": ("x",), "spacing": 0.2}, "1 long along 'x'; it must hold 4 support radii of 0.4.*at most 0.125"),
         (
             {"periodic": ("x",), "spacing": 0.03},
@@ -41,7 +40,6 @@ def scene(**changes):
         ({"moving_walls": [PISTON], "periodic": ("x",)}, "moving_walls.0: the domain has no wall 'x-'"),
         ({"moving_walls": [PISTON], "walls": False}, "moving_walls.0: the domain has no wall 'x-'"),
         ({"moving_walls": [PISTON, PISTON]}, "moving_walls: two of them are the same face"),
-        ({"moving_walls": [rts.MovingWall("x-", (0, 1), (0, 0.95))]}, "moving_walls.0: 'x-' would close the domain"),
         ({"inflows": [rts.Inflow((0.4, 0.9), (0.5, 0.9), (0, -3))]}, "inflows.0: the patch must lie on face 'y\\+'"),
         ({"inflows": [rts.Inflow((0.4, 1), (0.5, 1), (0, 3))]}, "inflows.0: the patch must lie on face 'y-'"),
         ({"inflows": [rts.Inflow((0.4, 1), (0.42, 1), (0, -3))]}, "narrower than the spacing 0.05"),
@@ -59,13 +57,11 @@ def test_contradictions_name_value_limit_and_remedy(changes, message):
     ("make", "message"),
     [
         (lambda: rts.MovingWall("x-", (0, 1), (0.1, 0.2)), "must begin with 0"),
-        (lambda: rts.MovingWall("x-", (1, 0), (0, 0.2)), "must ascend"),
         (lambda: rts.MovingWall("x-", (0, 1, 2), (0, 0.2)), "times has 3 entries, displacements 2"),
         (lambda: rts.MovingWall("x+", (0, 1), (0, 0.2)), "take face 'x\\+' out of the domain"),
         (lambda: rts.MovingWall("w", (0, 1), (0, 0.2)), "'x-', 'x\\+'"),
         (lambda: rts.Inflow((0, 0), (1, 1), (0, 1)), "is not flat"),
         (lambda: rts.Inflow((0, 0), (1, 0), (1, 0)), "does not cross the patch; give it a component along y"),
-        (lambda: rts.Inflow((0, 0), (1, 0), (0, 1), start=2, stop=1), "stop 1.0 must exceed start 2.0"),
         (lambda: rts.Inflow((0, 0), (1, 0), (0, 1, 0)), "differ in dimension"),
     ],
 )
@@ -130,15 +126,17 @@ def test_wide_supports_have_as_many_planes_behind_every_face_but_the_inflows():
     assert len(layer.positions) == 2 * 2 * 20
 
 
-@pytest.mark.parametrize("density", ["summation", "continuity"])
+@pytest.mark.parametrize("density", ["summation", pytest.param("continuity", marks=pytest.mark.slow)])
 def test_a_face_that_may_move_pushes_as_one_at_rest(simulate, density):
-    """With several planes, and friction on them."""
+    """With several planes, and friction on them. The work of moving walls needs a debug run, which this is not."""
     medium = {"support_ratio": 3.0, "kernel": "wendland_c2", "kinematic_viscosity": 0.01, "density": density}
     slid = rts.Block((0, 0), (0.5, 0.4), velocity=(0.3, -0.5))
     pushes = []
     for walls in ([], [rts.MovingWall("x-", (5, 6), (0, 0.1)), rts.MovingWall("y-", (5, 6), (0, 0.1))]):
         sim = simulate(scene(fluids=[slid], moving_walls=walls, sound_speed=20.0, **medium), rts.Uniform())
         pushes.append(sim.particles.to_numpy(sim.particles.a))
+    with pytest.raises(rts.Error, match="debug=True"):
+        sim.work()
     assert np.abs(pushes[0][:, 0]).max() > 3.0
     np.testing.assert_allclose(pushes[1], pushes[0], rtol=1e-9, atol=1e-9)
 
@@ -232,12 +230,6 @@ def test_a_piston_pushes_and_its_work_is_counted(simulate, stepper):
     assert sim.work() > 100.0
     assert sim.energy().total == pytest.approx(sim.work(), rel=0.03)
     assert np.abs(sim.momentum_drift()).max() < 0.02 * np.abs(sim.momentum()).max()
-
-
-def test_work_of_walls_needs_a_debug_run(simulate, unstarted):
-    sim = simulate(scene(moving_walls=[PISTON]), rts.Uniform())
-    with pytest.raises(rts.Error, match="debug=True"):
-        sim.work()
 
 
 @each_stepper

@@ -177,7 +177,7 @@ def test_windows_reach_across_periodic_faces(taichi_cpu_f64, periodic):
     check(Sums(cloud(len(periodic)), periodic, wall_beside(len(periodic)) if not periodic[-1] else None))
 
 
-@pytest.mark.parametrize("bounds_checked", [False, True])
+@pytest.mark.parametrize("bounds_checked", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_what_does_not_fit_into_a_window_is_summed_without(start_taichi, bounds_checked):
     crowd = np.random.default_rng(1).uniform(0.1, 0.3, (3000, 2))
     with start_taichi("cpu", "f64", debug=bounds_checked):

@@ -83,7 +83,7 @@ def test_water_at_rest_lifts_obstacles_by_what_they_displace(simulate):
         sim.obstacle_forces()
 
 
-@pytest.mark.parametrize("ratio", [2.0, 3.0])
+@pytest.mark.parametrize("ratio", [pytest.param(2.0, marks=pytest.mark.slow), 3.0])
 def test_friction_slows_down_what_passes_an_edge_or_a_thin_plate(simulate, ratio):
     plates = (rts.BoxObstacle((0.2, 0.4), (0.5, 0.48)), rts.BoxObstacle((0.6, 0.3), (0.9, 0.6)))
     stream = rts.Block((0, 0), (1, 1), velocity=(1.0, 0.0))

@@ -96,7 +96,7 @@ def test_pressure_force_is_the_slope_of_the_internal_energy_walls_included(taich
             assert sim.medium.mass * a[i, d] == pytest.approx(force, rel=1e-5, abs=1e-6 * abs(a).max())
 
 
-@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("dim", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_pair_forces_conserve_momentum_to_rounding(taichi_cpu_f64, dim):
     scene = make_scene(dim, walls=False, artificial_viscosity=0.1, kinematic_viscosity=0.01)
     sim = rts.Simulation(scene, rts.Uniform())
@@ -110,7 +110,7 @@ def test_pair_forces_conserve_momentum_to_rounding(taichi_cpu_f64, dim):
         assert {field.n for field in (sim.particles.x, sim.particles.v, sim.particles.a, sim.near.x)} == {2}
 
 
-@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("dim", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_body_force_is_added_to_gravity_and_is_the_slope_of_the_potential_energy(taichi_cpu_f64, dim):
     gradient = ((-3, 0.5, 0), (0.5, 2, -1), (0, -1, 4))
     field = rts.LinearField([row[:dim] for row in gradient[:dim]], value=(1, -2, 3)[:dim], origin=(0.2, 0.1, 0.4)[:dim])

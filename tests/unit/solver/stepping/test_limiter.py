@@ -12,6 +12,12 @@ from taichi_rts.solver.stepping.limiter import EMPTY, Ladder, NeighbourLimiter, 
 from taichi_rts.solver.stepping.settled import lengths
 
 
+@pytest.fixture(scope="module")
+def started(start_taichi, quick):
+    with start_taichi("cpu", "f32", **quick) as device:
+        yield device
+
+
 def random_levels(geometry, n_max=5, seed=0):
     """Levels 1 to n_max inside the domain, a third of the blocks empty, and the margin empty."""
     rng = np.random.default_rng(seed)
@@ -42,7 +48,7 @@ def occupy(grid, blocks):
 
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("jump", [0, 1])
-def test_no_block_keeps_more_than_its_neighbours_raw_level_plus_jump(taichi_cpu, dim, jump):
+def test_no_block_keeps_more_than_its_neighbours_raw_level_plus_jump(started, dim, jump):
     geometry = Geometry((0,) * dim, (1.1,) * dim, 0.1)
     source, target = ti.field(ti.i32, geometry.blocks), ti.field(ti.i32, geometry.blocks)
     grid = BlockGrid(geometry, 1)
@@ -111,8 +117,8 @@ def two_fast_blocks(slow):
 
 
 @pytest.mark.parametrize("steps", ["integers", "half_octaves", "powers_of_two"])
-@pytest.mark.parametrize("levels", [2, 3, 5, 8])
-def test_grading_leaves_jumps_of_one_level_and_only_lowers(taichi_cpu, levels, steps):
+@pytest.mark.parametrize("levels", [3, 8, *(pytest.param(levels, marks=pytest.mark.slow) for levels in (2, 5))])
+def test_grading_leaves_jumps_of_one_level_and_only_lowers(started, levels, steps):
     members = np.array(lengths(steps, levels))
     stepper = rts.Regional(levels=levels, grading=True, steps=steps, limiter=False)
     geometry, raw, occupied, (graded,) = levels_from(stepper, two_fast_blocks(members[-1]))
@@ -125,7 +131,7 @@ def test_grading_leaves_jumps_of_one_level_and_only_lowers(taichi_cpu, levels, s
 
 
 @pytest.mark.parametrize("steps", ["integers", "half_octaves", "powers_of_two"])
-def test_a_frozen_state_keeps_a_fixed_pattern_of_levels(taichi_cpu, steps):
+def test_a_frozen_state_keeps_a_fixed_pattern_of_levels(started, steps):
     stepper = rts.Regional(levels=12, steps=steps, limiter=True)
     geometry, raw, occupied, found = levels_from(stepper, two_fast_blocks(lengths(steps, 12)[-1]), ticks=200)
     settled_pattern = found[48]  # every level has been a divisor of a tick since then, and again
@@ -152,7 +158,7 @@ def settled(limiter, cases):
     return found.tolist()
 
 
-def test_levels_shrink_at_once_and_grow_by_one_when_synchronised_and_the_blocks_beside_allow_it(taichi_cpu):
+def test_levels_shrink_at_once_and_grow_by_one_when_synchronised_and_the_blocks_beside_allow_it(started):
     ladder = Ladder(lengths("half_octaves", 12))
     rows = [
         (1, 8, EMPTY, 3, 1),  # wanted, before, least beside, tick: level
@@ -181,13 +187,13 @@ def test_levels_shrink_at_once_and_grow_by_one_when_synchronised_and_the_blocks_
     assert found.tolist() == table[:, 4].tolist()
 
 
-def test_steps_shrink_at_once_and_grow_by_one_level_when_synchronised(taichi_cpu):
+def test_steps_shrink_at_once_and_grow_by_one_level_when_synchronised(started):
     doubling, free = NeighbourLimiter(), NeighbourLimiter(aligned=False)
     assert settled(doubling, [(1, 8, 3), (8, 8, 3), (8, 2, 4), (8, 2, 6), (4, 2, 2), (8, 1, 2)]) == [1, 8, 4, 2, 2, 2]
     assert settled(free, [(9, 3, 7), (5, 3, 7), (2, 3, 7)]) == [6, 5, 2]
 
 
-def test_a_woken_step_ends_now_or_where_twice_the_neighbours_step_would_have(taichi_cpu):
+def test_a_woken_step_ends_now_or_where_twice_the_neighbours_step_would_have(started):
     limiter = NeighbourLimiter()
     cases = np.array([(0, 8, 3, 1), (0, 8, 3, 2), (0, 8, 1, 1), (4, 2, 4, 1), (0, 3, 2, 5)], dtype=np.int32)
     ends = np.empty(len(cases), dtype=np.int32)
@@ -201,7 +207,7 @@ def test_a_woken_step_ends_now_or_where_twice_the_neighbours_step_would_have(tai
     assert ends.tolist() == [3, 4, 2, 6, 3]
 
 
-def test_the_limiter_of_regions_halves_the_step_at_most_from_block_to_block(taichi_cpu):
+def test_the_limiter_of_regions_halves_the_step_at_most_from_block_to_block(started):
     geometry, raw, occupied, (limited,) = levels_from(rts.Regional(levels=8, limiter=True), two_fast_blocks(8))
     assert (limited <= np.minimum(raw, lowest_neighbour(geometry, raw)))[occupied].all()
     assert (limited <= 2 * lowest_neighbour(geometry, limited))[occupied].all()

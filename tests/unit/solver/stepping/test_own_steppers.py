@@ -88,7 +88,7 @@ def test_a_checkpoint_goes_on_with_the_same_bits(simulate, registered, tmp_path)
         match=r"own.npz: stepper 'gentle' is none of uniform, regional, asynchronous; .*load_checkpoint\(..., steppers",
     ):
         rts.load_checkpoint(path)
-    rts.init("cpu", "f64", restart=True)
+    rts.init("cpu", "f64", restart=True, advanced_optimization=False)
     assert rts.load_checkpoint(path, steppers=[Gentle]).schedule.steps == steps
 
 
