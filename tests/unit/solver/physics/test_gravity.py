@@ -60,7 +60,7 @@ def test_free_fall_under_linear_gravity_is_exact(simulate, stepper, monkeypatch)
     start, energy = sim.positions().mean(axis=0), sim.energy().total
     looks.clear()
     sim.advance_to(0.35)
-    assert len(looks) < 40  # not 3000
+    assert len(looks) < 100  # not 3000
     fine = np.linspace(0.0, 0.35, 35001)
     pull = falling(ROWS).gravity_table.at(fine)
     middles, step = 0.5 * (pull[1:] + pull[:-1]), fine[1]
