@@ -7,7 +7,6 @@ import time as clock
 from collections.abc import Callable, Sequence
 from typing import Any, cast
 
-import numpy as np
 from PIL import Image
 
 from taichi_rts.assembly.budget import Budget
@@ -22,6 +21,7 @@ from taichi_rts.device.backend import ti
 from taichi_rts.device.ownership import guarded
 from taichi_rts.errors import Interrupted, SimulationDivergedError, TimeError
 from taichi_rts.readings.diagnosis import require_whole
+from taichi_rts.readings.gravity_work import MOST_STEPS, next_look, work_between
 from taichi_rts.readings.readers import Readers
 from taichi_rts.rendering.painter import Painter, PictureOptions
 from taichi_rts.sampling.sampling import sample
@@ -118,12 +118,8 @@ class Simulation(Readers, Budget, Measured):
         """
         if time < self._time:
             raise TimeError(f"time {time:g} s lies before the present {self._time:g} s; runs only go forward")
-        for change in self.scene.gravity_changes:
-            if self._time < change.time <= time:  # the potential energy jumps there
-                self._advance(change.time)
-                present = self.read()
-                before = present.potential_energy(float(np.nextafter(change.time, 0.0)))
-                self.gravity_work += present.potential_energy(change.time) - before
+        if self.scene.gravity_changes:
+            self._advance_under_changes(time)
         self._advance(time)
         self._check_finite()
 
@@ -149,6 +145,16 @@ class Simulation(Readers, Budget, Measured):
     def show(self, **options: Any) -> Image.Image:
         """Return a picture of the present state, which a notebook shows; `options` are those of `PictureOptions`."""
         return Image.fromarray(Painter(self.scene, PictureOptions(**options)).paint(self))
+
+    def _advance_under_changes(self, time: float) -> None:
+        """Run to the last reading before `time` [s] that the work of changes of gravity needs."""
+        table, reach = self.scene.gravity_table, MOST_STEPS * self.base_step
+        look = self.read() if table.linear else None
+        while (at := next_look(table, self._time, time, look, reach)) is not None:
+            self._advance(at)
+            present = self.read()
+            self.gravity_work += work_between(table, look or present, present)
+            look = present
 
     def _advance(self, time: float) -> None:
         target = self.timeline.ticks_until(time)

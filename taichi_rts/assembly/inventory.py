@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.device.backend import ti
+from taichi_rts.scene.scene import Scene
 
 PACKAGE = "taichi_rts"
 PLAIN = (bool, int, float, str, type(None), np.ndarray, np.generic)
@@ -49,7 +50,7 @@ class State:
 
     def _look_at(self, path: str, thing: Any, seen: set[int]) -> list[tuple[str, Any]]:
         """Take note of `thing` and return what it is made of."""
-        if id(thing) in seen:
+        if id(thing) in seen or isinstance(thing, Scene):  # a description: it never changes, and may have 100,000 parts
             return []
         seen.add(id(thing))
         if isinstance(thing, ti.Field):

@@ -228,19 +228,17 @@ class Reading:
     @cached_property
     def energy(self) -> Energy:
         """Kinetic, potential and internal energy [J]."""
-        return self._energy_at(self.time)
-
-    def potential_energy(self, time: float) -> float:
-        """Potential energy [J] that these positions have in the gravity of `time` [s]."""
-        return self._energy_at(time).potential
-
-    def _energy_at(self, time: float) -> Energy:
-        return measure_energy(self.local, self.medium, self.local_positions, self.velocities, self.densities, time)
+        return measure_energy(self.local, self.medium, self.local_positions, self.velocities, self.densities, self.time)
 
     @cached_property
     def momentum(self) -> np.ndarray:
         """Total momentum [kg m/s], (dim,)."""
         return _held(self.medium.mass * self.velocities.astype(np.float64).sum(axis=0))
+
+    @cached_property
+    def first_moment(self) -> np.ndarray:
+        """First moment of mass [kg m], (dim,), counted from `origin`."""
+        return _held(self.medium.mass * self.local_positions.astype(np.float64).sum(axis=0))
 
     @cached_property
     def max_speed(self) -> float:

@@ -5,7 +5,7 @@ SI units throughout: m, s, kg. A vector with two components makes a two-dimensio
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from annotated_types import Len
 from pydantic import Field, StringConstraints
@@ -21,6 +21,14 @@ from taichi_rts.scene.parts.velocities import LinearField
 from taichi_rts.scene.parts.view import View
 from taichi_rts.scene.validation import FROZEN, NAME, NotNegative, Number, Positive, Vector
 
+
+def _or_a_file(schema: dict[str, Any]) -> None:
+    """Tell a JSON Schema that a scene file may name a table instead (`files.gravity_tables`)."""
+    rows = {key: schema.pop(key) for key in ("type", "items") if key in schema}
+    file = {"type": "object", "properties": {"file": {"type": "string"}}, "required": ["file"]}
+    schema["anyOf"] = [rows, file | {"additionalProperties": False}]
+
+
 MOST_PARTS = 1000  # fluids or obstacles of a scene: each is compared with each
 
 
@@ -34,7 +42,9 @@ class SceneFields:
             half a spacing apart.
         spacing: initial particle spacing s [m].
         gravity: acceleration [m/s^2], (dim,); None: 9.81 m/s^2 along -y.
-        gravity_changes: from each one's time on gravity is another.
+        gravity_changes: from each one's time on gravity is another; a scene file may name a table, `{ file = "g.csv" }`.
+        gravity_interpolation: "step": gravity jumps at each change's time; "linear": it goes on at a constant rate from one to
+            the next, from `gravity` at time 0 to the first.
         body_force: acceleration [m/s^2] added to gravity, linear in space; its gradient must be symmetric.
         sound_speed: c_s [m/s]; None: ten times an estimate of the largest speed (see `estimate_max_speed`); "regional" or a
             `RegionalSound`: every block's own; "auto": regional where that pays (`with_sound_for`).
@@ -66,7 +76,8 @@ class SceneFields:
     fluids: Annotated[tuple[Fluid, ...], Len(1, MOST_PARTS)]
     spacing: Positive
     gravity: Vector | None = None
-    gravity_changes: tuple[GravityChange, ...] = ()
+    gravity_changes: Annotated[tuple[GravityChange, ...], Field(json_schema_extra=_or_a_file)] = ()
+    gravity_interpolation: Literal["step", "linear"] = "step"
     body_force: LinearField | None = None
     sound_speed: SoundSpeed | None = None
     density: Literal["summation", "continuity"] = "summation"

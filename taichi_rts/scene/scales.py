@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import math
+
+import numpy as np
 
 from taichi_rts.scene.fields import SceneFields
 from taichi_rts.scene.geometry.bodies import bodies
+from taichi_rts.scene.parts.gravity import GravityTable
 from taichi_rts.scene.parts.sound import FLOOR, RegionalSound
 
 LARGEST_RATIO = 32.0  # of sound speeds in one scene
@@ -36,7 +40,14 @@ class SceneScales(SceneFields):
 
     def acceleration_at(self, time: float) -> tuple[float, ...]:
         """Gravity [m/s^2], (dim,), at `time` [s]."""
-        return next((c.gravity for c in reversed(self.gravity_changes) if c.time <= time), self.acceleration)
+        return tuple(self.gravity_table.at(np.array([time]))[0].tolist())
+
+    @functools.cached_property
+    def gravity_table(self) -> GravityTable:
+        """Gravity as a function of time, with that of the start."""
+        times = np.array([0.0, *(change.time for change in self.gravity_changes)])
+        values = np.array([self.acceleration, *(change.gravity for change in self.gravity_changes)])
+        return GravityTable(times, values, self.gravity_interpolation == "linear")
 
     @property
     def viscosities(self) -> tuple[float, ...]:
@@ -104,24 +115,31 @@ class SceneScales(SceneFields):
     @property
     def depth_potential(self) -> float:
         """Product g H [m^2/s^2], H being the largest depth of the fluids, one on top of the other, under any gravity."""
-        return max(self._stack(gravity) for gravity in (self.acceleration, *(c.gravity for c in self.gravity_changes)))
+        pulls = np.abs(self.gravity_table.values)
+        mains = pulls.argmax(axis=1)
+        return max(self._stack(pulls[mains == main], main) for main in set(mains.tolist()))
 
-    def _stack(self, gravity: tuple[float, ...]) -> float:
-        """Product g H [m^2/s^2] under `gravity` [m/s^2], (dim,): fluids that overlap across its main axis stand on each other."""
-        main = max(range(self.dim), key=lambda d: abs(gravity[d]))
+    def _stack(self, pulls: np.ndarray, main: int) -> float:
+        """Largest product g H [m^2/s^2] under `pulls`, magnitudes of gravity [m/s^2], (K, dim), with the main axis `main`.
+
+        Fluids that overlap across that axis stand on each other.
+        """
         across = [d for d in range(self.dim) if d != main]
         thickness = [
-            sum(abs(g) * (b - a) for g, a, b in zip(gravity, fluid.lower, fluid.upper, strict=True))
-            for fluid in self.fluids
+            sum(pulls[:, d] * (fluid.upper[d] - fluid.lower[d]) for d in range(self.dim)) for fluid in self.fluids
         ]
-        return max(
+        stacks = [
             sum(
-                thickness[k]
-                for k, other in enumerate(self.fluids)
-                if all(other.lower[d] < fluid.upper[d] and fluid.lower[d] < other.upper[d] for d in across)
+                (
+                    thickness[k]
+                    for k, other in enumerate(self.fluids)
+                    if all(other.lower[d] < fluid.upper[d] and fluid.lower[d] < other.upper[d] for d in across)
+                ),
+                start=np.zeros(len(pulls)),
             )
             for fluid in self.fluids
-        )
+        ]
+        return float(np.max(stacks))
 
     @property
     def wall_speed(self) -> float:
@@ -140,10 +158,9 @@ class SceneScales(SceneFields):
         starts += [(math.hypot(*inflow.velocity), inflow.reach(uphill)) for inflow in self.inflows]
         falls = [(speed, max(height - self.floor_potential, 0.0)) for speed, height in starts]
         top = max(speed for speed, _ in falls)
-        for change in self.gravity_changes:
-            falls.append(
-                (top, sum(abs(g) * length for g, length in zip(change.gravity, self.domain.size, strict=False)))
-            )
+        if self.gravity_changes:
+            pulls = np.abs(self.gravity_table.values[1:])
+            falls.append((top, float(sum(pulls[:, d] * length for d, length in enumerate(self.domain.size)).max())))
         return max(self.wall_speed, *(math.sqrt(speed**2 + 2.0 * fall) for speed, fall in falls))
 
     @property

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -50,9 +49,10 @@ def demanded_density(scene: Scene) -> float:
     Depth: `still_density` of g H, H being the settled depth or the tallest fluid. Impact: `jump_density` of `impact_speed`.
     Fluid that meets a pool of its own kind is slowed by half only, but the shock's echo from the floor stops the other half.
     """
+    gravities = scene.gravity_table.values
     depths = [
-        np.linalg.norm(g) * max(settled_depth(scene, g), *(_extent(fluid, g) for fluid in scene.fluids))
-        for g in gravities(scene)
+        np.linalg.norm(g) * max(settled, *(_extent(fluid, g) for fluid in scene.fluids))
+        for g, settled in zip(gravities, settled_depth(scene, gravities), strict=True)
     ]
     speed = scene.wave_speed
     return max(
@@ -76,38 +76,33 @@ def wall_speed(scene: Scene) -> float:
     return scene.wall_speed
 
 
-def gravities(scene: Scene) -> Iterator[tuple[float, ...]]:
-    """All values that gravity [m/s^2] takes."""
-    yield scene.acceleration
-    yield from (change.gravity for change in scene.gravity_changes)
+def settled_depth(scene: Scene, gravities: np.ndarray) -> np.ndarray:
+    """Depths [m], (K,), of all fluid once it lies flat in the domain, along the axis nearest to each of `gravities`, (K, dim).
 
-
-def settled_depth(scene: Scene, gravity: tuple[float, ...]) -> float:
-    """Depth [m] of all fluid once it lies flat in the domain, along the axis nearest to `gravity`; 0 without gravity."""
-    if not any(gravity):
-        return 0.0
-    size = list(scene.domain.size)
-    across = math.prod(size) / size[int(np.argmax(np.abs(gravity)))]
-    return scene.volume / across
+    0 without gravity.
+    """
+    size = np.array(scene.domain.size)
+    across = size.prod() / size[np.abs(gravities).argmax(axis=1)]
+    return np.where(gravities.any(axis=1), scene.volume / across, 0.0)
 
 
 def _fall(scene: Scene, fluid: Any) -> float:
     """Largest 2 g h [m^2/s^2] for one fluid."""
-    falls = []
-    for k, g in enumerate(gravities(scene)):
-        uphill = tuple(-a for a in g)
-        start = fluid.reach(uphill) if k == 0 else scene.domain.reach(uphill)
-        depth = float(np.linalg.norm(g)) * settled_depth(scene, g)
-        falls.append(max(start + scene.domain.reach(g) - depth, 0.0))
-    slack = 1e-9 * max(falls)
-    return 2.0 * max(fall if fall > slack else 0.0 for fall in falls)
+    gravities = scene.gravity_table.values
+    depths = np.linalg.norm(gravities, axis=1) * settled_depth(scene, gravities)
+    # From the fluid's own top at the start, from that of the domain after a change; to the bottom of the domain.
+    starts = np.abs(gravities) @ np.array(scene.domain.size)
+    uphill = tuple((-gravities[0]).tolist())
+    starts[0] = fluid.reach(uphill) + scene.domain.reach(scene.acceleration)
+    falls = np.maximum(starts - depths, 0.0)
+    return 2.0 * float(falls[falls > 1e-9 * falls.max()].max(initial=0.0))
 
 
-def _extent(fluid: Any, gravity: tuple[float, ...]) -> float:
+def _extent(fluid: Any, gravity: np.ndarray) -> float:
     """Length [m] of a fluid along `gravity`."""
     length = float(np.linalg.norm(gravity))
-    uphill = tuple(-a for a in gravity)
-    return (fluid.reach(uphill) + fluid.reach(gravity)) / length if length else 0.0
+    down = tuple(gravity.tolist())
+    return (fluid.reach(tuple(-a for a in down)) + fluid.reach(down)) / length if length else 0.0
 
 
 def _body_force_potential(scene: Scene) -> float:

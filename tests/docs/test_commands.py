@@ -13,7 +13,7 @@ from documents import PAGES, ROOT, anchors, blocks, commands, links, name, scene
 
 import taichi_rts as rts
 from taichi_rts.errors import Error
-from taichi_rts.scene.files.reading import tomllib
+from taichi_rts.scene.files.reading import tomllib, with_files_beside
 from taichi_rts.scene.loading import scene_from
 
 ALL = sorted({name(page) for page in PAGES})
@@ -133,7 +133,8 @@ def test_scene_files_hold(page, folder, monkeypatch):
             part["obstacles"] = [
                 each | {"scale": 1.0} if "file" in each else each for each in part.get("obstacles", ())
             ]
-            scene_from(dummy | part)
+            (folder / "shaken.csv").write_text("0.01, 0.2, -9.81, 0.0\n")
+            scene_from(with_files_beside(dummy | part, folder / "part.toml"))
 
 
 def flattened(value):

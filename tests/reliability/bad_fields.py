@@ -10,6 +10,7 @@ KINDS = ("missing", "wrong type", "NaN", "infinite", "negative", "zero", "huge",
 VALID = {
     "gravity": {"missing"},
     "gravity_changes": {"missing"},
+    "gravity_interpolation": {"missing"},
     "body_force": {"missing"},
     "body_force.value": {"missing"},
     "body_force.origin": {"missing"},

@@ -16,6 +16,7 @@ SOLID: dict[str, Any] = {
     "spacing": 0.1,
     "gravity": [0.0, -9.81, 0.0],
     "gravity_changes": [{"time": 0.5, "gravity": [1.0, -9.81, 0.0]}],
+    "gravity_interpolation": "linear",
     "body_force": {
         "gradient": [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]],
         "value": [0.1, 0.0, 0.0],

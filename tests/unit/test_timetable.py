@@ -204,6 +204,26 @@ def test_gravity_changes_at_its_tick(start):
         np.testing.assert_array_equal(found[1:], [[1.0, 2.0]] * 2)
 
 
+@NUMBERS
+def test_a_hundred_thousand_changes_of_gravity_are_data(start, precision):
+    count, tick = 100_000, 1e-4
+    times, values = np.arange(1, count + 1) * 1e-3, np.sin(np.arange(1, count + 1) * 0.01)
+    changes = [rts.GravityChange(t, (v, -9.81)) for t, v in zip(times.tolist(), values.tolist(), strict=True)]
+    scene = rts.Scene(UNIT, (rts.Block((0, 0), (1, 0.2)),), 0.05, sound_speed=50.0, gravity_changes=changes)
+    ticks = np.array([0, 9, 10, 11, 500_015, 999_999, 1_000_000, 1_500_000])
+    for interpolation, row in (("step", np.floor(ticks / 10)), ("linear", ticks / 10)):
+        with start(precision):
+            gravity = counted(Gravity(scene.replace(gravity_interpolation=interpolation)), tick)
+
+            @ti.func
+            def pull(now, tick, gravity=gravity):
+                return gravity.acceleration(ti.Vector([0.5, 0.5]), now, tick)
+
+            found = Look(pull, 2, precision).at(ticks, tick)
+        wanted = np.interp(row, np.arange(count + 1), np.append(0.0, values))
+        np.testing.assert_allclose(found[:, 0], wanted, atol=1e-12 if precision == "f64" else 2e-7)
+
+
 def test_moments_that_no_run_reaches_never_come(start):
     with start("f32"):
         table = counted(Timetable([0.0, 1e9], [1e30, 1e30]), 1e-6)

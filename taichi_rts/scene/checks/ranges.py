@@ -75,7 +75,9 @@ def _certain_speed(scene: SceneScales) -> float:
 def _accelerations(scene: SceneScales) -> list[tuple[str, float]]:
     """Names and sizes [m/s^2] of what accelerates all fluid."""
     found = [("gravity", math.hypot(*scene.acceleration))]
-    found += [(f"gravity_changes.{k}", math.hypot(*change.gravity)) for k, change in enumerate(scene.gravity_changes)]
+    if scene.gravity_changes:
+        k, largest = max(enumerate(scene.gravity_changes), key=lambda each: math.hypot(*each[1].gravity))
+        found.append((f"gravity_changes.{k}", math.hypot(*largest.gravity)))
     if scene.body_force is not None:
         found.append(("body_force", scene.body_force.top_speed(np.array(corners(scene.domain)))))
     return found

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from taichi_rts.errors import SceneError
+from taichi_rts.scene.files.gravity_tables import with_gravity_table
 from taichi_rts.scene.files.splishsplash import from_splishsplash, is_splishsplash
 
 if sys.version_info >= (3, 11):
@@ -62,9 +63,19 @@ def name_for(path: Path) -> str:
 def with_files_beside(data: dict[str, Any], path: Path) -> dict[str, Any]:
     """Return the data of the scene file `path` with the files of its particles and meshes relative to its folder.
 
-    Raises `SceneError` for a file outside that folder.
+    A table of gravity is read. Raises `SceneError` for a file outside that folder.
     """
     folder = path.resolve().parent
+
+    def inside(place: str, name: str) -> Path:
+        file = _resolved(folder, name)
+        if file is None or not file.is_relative_to(folder):
+            raise SceneError(f"{path}: {place}.file: {name!r} leaves the scene's folder {str(folder)!r}; put it there")
+        return file
+
+    table = data.get("gravity_changes")
+    if isinstance(table, dict) and isinstance(table.get("file"), str) and len(table) == 1:
+        data = with_gravity_table(data, inside("gravity_changes", table["file"]))
     resolved: dict[str, Any] = {}
     for key in ("fluids", "obstacles"):
         parts = data.get(key)
@@ -73,12 +84,7 @@ def with_files_beside(data: dict[str, Any], path: Path) -> dict[str, Any]:
         resolved[key] = []
         for k, part in enumerate(parts):
             if isinstance(part, dict) and isinstance(part.get("file"), str):
-                file = _resolved(folder, part["file"])
-                if file is None or not file.is_relative_to(folder):
-                    raise SceneError(
-                        f"{path}: {key}.{k}.file: {part['file']!r} leaves the scene's folder {str(folder)!r}; put it there"
-                    )
-                part = part | {"file": str(file)}
+                part = part | {"file": str(inside(f"{key}.{k}", part["file"]))}
             resolved[key].append(part)
     return data | resolved
 

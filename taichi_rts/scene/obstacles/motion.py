@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from typing import Annotated, Any, NamedTuple
 
@@ -119,6 +120,13 @@ class Keyframes:
 
     def pieces(self, dim: int) -> Pieces:
         """Return K-1 pieces, and one at rest after the last."""
+        return self._pieces
+
+    @functools.cached_property
+    def _pieces(self) -> Pieces:
+        """Worked out once: there may be 100,000."""
+        rows = self.displacements or self.rotations or ()
+        dim = len(rows[0]) if self.displacements else (2 if len(rows[0]) == 1 else 3)
         times = np.array(self.times)
         shifts = np.array(self.displacements or [(0.0,) * dim] * len(times))
         angles = np.radians(np.array(self.rotations or [(0.0,) * (1 if dim == 2 else 3)] * len(times)))

@@ -14,7 +14,7 @@ from taichi_rts.solver.grid.sums import make_wall_sum
 from taichi_rts.solver.grid.windows import FluidWindows
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
 from taichi_rts.solver.physics.own_forces import OwnBodies, OwnForces, OwnPairs
-from taichi_rts.solver.physics.timetable import Timetable
+from taichi_rts.solver.physics.timetable import Timetable, store
 
 
 @ti.data_oriented
@@ -46,11 +46,17 @@ class Gravity:
 
     def __init__(self, scene: Scene) -> None:
         self.gravity = scene.acceleration
-        self.changes = [change.gravity for change in scene.gravity_changes]
-        if self.changes:
-            times = [change.time for change in scene.gravity_changes]
-            self.table = Timetable(times, [*np.diff(times), 1e30])
         self.dim = scene.dim
+        self.changes = bool(scene.gravity_changes)
+        if self.changes:
+            table = scene.gravity_table
+            self.linear, count = table.linear, len(table.times)
+            self.table = Timetable(table.times, [*np.diff(table.times), 1e30])
+            self.value = ti.Vector.field(self.dim, float, count)
+            store(self.value, table.values)
+            if self.linear:
+                self.rate = ti.Vector.field(self.dim, float, count)
+                store(self.rate, table.rates)
         force = scene.body_force
         self.has_body_force = force is not None
         if force is not None:
@@ -61,9 +67,11 @@ class Gravity:
     def acceleration(self, x, now, tick):
         """Acceleration [m/s^2], (dim,), at position `x` [m] and tick `now`."""
         total = ti.Vector(self.gravity)
-        for k in ti.static(range(len(self.changes))):
-            if self.table.since_start(k, now, tick, 0.0) >= 0.0:
-                total = ti.Vector(self.changes[k])
+        if ti.static(self.changes):
+            n = self.table.piece(now, tick, 0.0)
+            total = self.value[n]
+            if ti.static(self.linear):
+                total += self.table.since_start(n, now, tick, 0.0) * self.rate[n]
         if ti.static(self.has_body_force):
             for d in ti.static(range(self.dim)):
                 total[d] += self.force_value[d]

@@ -165,6 +165,7 @@ def test_a_scene_with_everything_comes_back_from_plain_data(tmp_path):
         ],
         gravity=(0, -1),
         gravity_changes=[rts.GravityChange(0.5, (1, 0))],
+        gravity_interpolation="linear",
         body_force=rts.LinearField(((-1, 0), (0, -1)), value=(0.1, 0)),
         sound_speed=20,
         kernel="wendland_c2",
