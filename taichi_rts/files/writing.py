@@ -83,10 +83,12 @@ def png(image: np.ndarray) -> bytes:
     colour_type = {3: 2, 4: 6}[channels]
     chunks = (
         (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, colour_type, 0, 0, 0)),
-        (b"IDAT", zlib.compress(filtered, PNG_COMPRESSION)),
+        (b"IDAT", zlib.compress(filtered.tobytes(), PNG_COMPRESSION)),
         (b"IEND", b""),
     )
-    parts = [struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks]
+    parts = [
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
+    ]
     return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
 
 

@@ -14,8 +14,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import imageio.v3 as imageio
 import numpy as np
+from PIL import Image
 
 from taichi_rts.assembly.frame_times import frame_times
 from taichi_rts.assembly.resources import require
@@ -264,7 +264,7 @@ class Recorder:
         films += [Gif(folder / "video.gif", fps)] if self.recording.gif else []
         for number in range(self.frames_done if films else 0):
             if self.frame_path(number).exists():
-                image = imageio.imread(self.frame_path(number))
+                image = np.asarray(Image.open(self.frame_path(number)))
                 for film in films:
                     film.append(image)
         return films

@@ -172,10 +172,12 @@ def sum_tiles(width: ti.i32, height: ti.i32, sums: Ints):
     rows = tiles_across(height) + 1
     for row in range(rows):
         for column in range(1, columns):
-            sums[row * columns + column] += sums[row * columns + column - 1]
+            k = row * columns + column
+            sums[k] = sums[k] + sums[k - 1]  # `+=` would be atomic
     for column in range(columns):
         for row in range(1, rows):
-            sums[row * columns + column] += sums[(row - 1) * columns + column]
+            k = row * columns + column
+            sums[k] = sums[k] + sums[k - columns]
 
 
 @ti.func

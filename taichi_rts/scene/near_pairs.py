@@ -51,7 +51,9 @@ def mean_neighbours(x: np.ndarray, support: float) -> float:
 
 def nearest_pair(x: np.ndarray, limit: float) -> tuple[float, int, int] | None:
     """Return distance [m] and places of the two of `x` [m], (N, dim), that are nearest to each other, if below `limit` [m]."""
-    from scipy.spatial import cKDTree  # not at the top: most runs need no tree, and its import takes longer than NumPy's
+    from scipy.spatial import (
+        cKDTree,
+    )  # not at the top: most runs need no tree, and its import takes longer than NumPy's
 
     if len(x) < 2:
         return None
