@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
+from PIL import Image
 
 from taichi_rts.errors import OutputError
 
@@ -67,6 +68,12 @@ def replacing(path: Path, temporary: Path | None = None) -> Iterator[BinaryIO]:
 def write_png(path: Path, image: np.ndarray) -> None:
     """Write a picture, (H, W, 3 or 4) uint8, in one go."""
     write_bytes(path, png(image))
+
+
+def read_png(path: Path) -> np.ndarray:
+    """Return the picture of a file, (H, W, 3 or 4) uint8."""
+    with Image.open(path) as picture:
+        return np.asarray(picture)
 
 
 def png(image: np.ndarray) -> bytes:
