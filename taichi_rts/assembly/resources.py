@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from taichi_rts.assembly.memory import buffer_bytes, device_bytes, host_bytes
 from taichi_rts.device.backend import Backend, has_vulkan_hardware
 from taichi_rts.errors import ResourceError
-from taichi_rts.scene.checks.size import finest_spacing
+from taichi_rts.scene.checks.size import finest_spacing, remedy
 from taichi_rts.scene.placing import origin_of, translated
 from taichi_rts.solver.stepping.timeline import MAX_TICKS
 
@@ -91,12 +91,9 @@ def require_memory(
     if found := lacking(None):
         where, needed, free = found
         best = finest_spacing(lambda s: lacking(s) is None, scene.spacing)
-        remedy = (
-            f"use a spacing of at least {best:g}" if math.isfinite(best) else "free some, or make the scene smaller"
-        )
         raise ResourceError(
             f"scene {scene.name!r} needs {text(needed)} of {where} with spacing {scene.spacing:g}, "
-            f"and {text(free)} are free; {remedy}"
+            f"and {text(free)} are free; {remedy(scene, best)}"
         )
 
 
@@ -113,10 +110,9 @@ def require_addresses(scene: Scene, steppers: Iterable[Any], backend: Backend, *
     needed, name = largest(None)
     if needed > MOST_ADDRESSED:
         best = finest_spacing(lambda s: largest(s)[0] <= MOST_ADDRESSED, scene.spacing)
-        remedy = f"use a spacing of at least {best:g}" if math.isfinite(best) else "make the scene smaller"
         raise ResourceError(
             f"scene {scene.name!r} needs {text(needed)} for {name} with spacing {scene.spacing:g}, and kernels address no more "
-            f"than {text(MOST_ADDRESSED)} at a time on {backend.arch}; {remedy}, or use --arch cuda or cpu"
+            f"than {text(MOST_ADDRESSED)} at a time on {backend.arch}; {remedy(scene, best)}, or use --arch cuda or cpu"
         )
 
 

@@ -9,7 +9,6 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-import imageio.v2 as imageio
 import numpy as np
 from PIL import Image
 
@@ -42,6 +41,8 @@ class Video:
         require_video()
         self.path = path
         self.temporary = path.with_name(f".{path.stem}.part.mp4")
+        import imageio.v2 as imageio  # only here: it imports what talks to the network
+
         options: dict[str, Any] = {"fps": fps, "codec": "libx264", "quality": 8, "macro_block_size": 2}
         self.writer = imageio.get_writer(self.temporary, format="FFMPEG", mode="I", **options)  # type: ignore[arg-type]
 

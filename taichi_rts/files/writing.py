@@ -6,16 +6,19 @@ import contextlib
 import json
 import os
 import shutil
+import struct
+import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import imageio.v3 as imageio
 import numpy as np
+from PIL import Image
 
 from taichi_rts.errors import OutputError
 
-PNG_COMPRESSION = 3  # of 9: 40 instead of 120 ms a frame for 10 % more bytes
+PNG_COMPRESSION = 3
+"""Of 9: half the time of 6 for 7 % more bytes."""
 ARTEFACTS = (
     "frames",
     "run.json",
@@ -64,7 +67,36 @@ def replacing(path: Path, temporary: Path | None = None) -> Iterator[BinaryIO]:
 
 def write_png(path: Path, image: np.ndarray) -> None:
     """Write a picture, (H, W, 3 or 4) uint8, in one go."""
-    write_bytes(path, imageio.imwrite("<bytes>", image, extension=".png", compress_level=PNG_COMPRESSION))
+    write_bytes(path, png(image))
+
+
+def read_png(path: Path) -> np.ndarray:
+    """Return the picture of a file, (H, W, 3 or 4) uint8."""
+    with Image.open(path) as picture:
+        return np.asarray(picture)
+
+
+def png(image: np.ndarray) -> bytes:
+    """Return a picture, (H, W, 3 or 4) uint8, as a PNG file.
+
+    Every row holds its differences from the row above (filter 2 of PNG, ISO/IEC 15948, 9.2). Choosing a filter for each row, as
+    Pillow does, takes twice the time and saves less than 1 % of the bytes.
+    """
+    height, width, channels = image.shape
+    rows = np.ascontiguousarray(image).reshape(height, width * channels)
+    filtered = np.full((height, 1 + rows.shape[1]), 2, np.uint8)
+    filtered[0, 1:] = rows[0]
+    np.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])
+    colour_type = {3: 2, 4: 6}[channels]
+    chunks = (
+        (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, colour_type, 0, 0, 0)),
+        (b"IDAT", zlib.compress(filtered.tobytes(), PNG_COMPRESSION)),
+        (b"IEND", b""),
+    )
+    parts = [
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
+    ]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
 
 
 def write_json(path: Path, data: Any) -> None:

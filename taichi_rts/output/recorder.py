@@ -14,7 +14,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import imageio.v3 as imageio
 import numpy as np
 
 from taichi_rts.assembly.frame_times import frame_times
@@ -23,7 +22,7 @@ from taichi_rts.device import backend, forks
 from taichi_rts.errors import CheckpointError, Interrupted, OutputError, SimulationDivergedError
 from taichi_rts.files.film import Gif, Video, require_video
 from taichi_rts.files.lock import FolderLock
-from taichi_rts.files.writing import prepare_folder, require_free, write_json, write_png
+from taichi_rts.files.writing import prepare_folder, read_png, require_free, write_json, write_png
 from taichi_rts.medium.energy import Energy
 from taichi_rts.output.blow_up import BlowUpGuard
 from taichi_rts.output.checkpoint import Checkpoint, write
@@ -264,7 +263,7 @@ class Recorder:
         films += [Gif(folder / "video.gif", fps)] if self.recording.gif else []
         for number in range(self.frames_done if films else 0):
             if self.frame_path(number).exists():
-                image = imageio.imread(self.frame_path(number))
+                image = read_png(self.frame_path(number))
                 for film in films:
                     film.append(image)
         return films

@@ -9,14 +9,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
-import imageio.v3 as imageio
 import numpy as np
 import tyro
+from PIL import Image
 
 from taichi_rts.errors import OutputError
 from taichi_rts.files.film import Gif, Video, require_video
 from taichi_rts.files.lock import FolderLock
-from taichi_rts.files.writing import prepare_folder, write_png
+from taichi_rts.files.writing import prepare_folder, read_png, write_png
 from taichi_rts.rendering import legend
 
 SAME_TIME = 1e-6  # share of the time; series.csv has nine digits
@@ -49,7 +49,8 @@ class Frames:
 
     def size(self) -> tuple[int, ...]:
         """Return height and width [pixels] of the first frame."""
-        return imageio.improps(self.paths[0]).shape[:2]
+        with Image.open(self.paths[0]) as picture:
+            return picture.size[::-1]
 
 
 def common_frames(runs: list[Frames]) -> int:
@@ -131,7 +132,7 @@ class SideBySide:
         """Yield the pictures, (H, W, 3) uint8, or 4 if a run's frames are transparent."""
         captions = self.captions or [run.folder.resolve().name for run in runs]
         for paths in zip(*(run.paths[:count] for run in runs), strict=True):
-            images = [imageio.imread(path) for path in paths]
+            images = [read_png(path) for path in paths]
             if len({image.shape[2] for image in images}) > 1:
                 images = [_with_alpha(image) for image in images]
             yield legend.hstack_panels(images, captions)

@@ -7,7 +7,17 @@ then every supersample is lit on its own and the average goes from linear light 
 import numpy as np
 
 from taichi_rts.device.backend import ti
-from taichi_rts.rendering.splat_kernels import FAR, NO_PARTICLE, Ints, Vectors3, Vectors4, metres_per_pixel, vec3, vec4
+from taichi_rts.rendering.splat_kernels import (
+    FAR,
+    NO_PARTICLE,
+    Ints,
+    Vectors3,
+    Vectors4,
+    is_marked,
+    metres_per_pixel,
+    vec3,
+    vec4,
+)
 
 TURNS = 16  # sampling patterns, one for each pixel of a 4 x 4 tile
 GOLDEN = np.pi * (3 - np.sqrt(5))
@@ -84,6 +94,57 @@ def open_sky(x, y, z, first, pairs, reach, lens, width, height, pattern: ti.temp
 
 
 @ti.kernel
+def count_samples(
+    depth: Ints,
+    spheres: Ints,
+    shaded: Ints,
+    lens: vec4,
+    ground: vec4,
+    ground_reach: ti.f32,
+    light_origin: vec3,
+    light_right: vec3,
+    light_up: vec3,
+    light_lens: vec4,
+    shadow_size: ti.i32,
+    softness: ti.f32,
+    reach: ti.f32,
+    width: ti.i32,
+    height: ti.i32,
+    supersample: ti.i32,
+    pairs: ti.i32,
+    taps: ti.i32,
+    veil: Vectors3,
+):
+    """Enter depth, and how many samples each final pixel needs for openness and for light: none where they would find nothing.
+
+    So it is on most of the ground, which is far from all spheres. `spheres` and `shaded` are the sums of the broad tiles of
+    picture and shadow map that spheres touch (`sum_tiles`).
+    """
+    columns = width // supersample
+    for p in range(veil.shape[0]):
+        row = p // columns
+        column = p - row * columns
+        x = ti.cast(column * supersample + supersample // 2, ti.f32) + ti.f32(0.5)
+        y = ti.cast(row * supersample + supersample // 2, ti.f32) + ti.f32(0.5)
+        bits = depth[ti.cast(y, ti.i32) * width + ti.cast(x, ti.i32)]
+        z = ti.bit_cast(bits, ti.f32)
+        if bits == FAR:
+            z = ground_depth(x, y, lens, ground, ground_reach)
+        sky, light = 0, 0
+        if z < ti.f32(NOTHING):
+            around = ti.max(reach / metres_per_pixel(z, lens), ti.f32(2.0)) + ti.f32(1.0)
+            if is_marked(x, y, around, width, height, spheres):
+                sky = pairs
+            side, above = view_offset(x, y, z, lens)
+            spot = vec3(side, above, z) - light_origin
+            u = light_lens[2] + light_lens[0] * spot.dot(light_right)
+            v = light_lens[3] - light_lens[0] * spot.dot(light_up)
+            if is_marked(u, v, softness + ti.f32(1.0), shadow_size, shadow_size, shaded):
+                light = taps
+        veil[p] = vec3(z, sky, light)
+
+
+@ti.kernel
 def measure_veil(
     depth: Ints,
     shadows: Ints,
@@ -111,10 +172,16 @@ def measure_veil(
 
     The pattern has `pairs` of samples for openness and `taps` for light; with none of them all is open, or lit.
 
+    How many of these a pixel needs is what `count_samples` has put into `veil`.
+
     The light's frame is given in view coordinates (right, up, forward, from the eye).
     """
     columns = width // supersample
     for p in range(veil.shape[0]):
+        needed = veil[p]
+        if needed[1] + needed[2] == 0:
+            veil[p] = vec3(needed[0], 1, 1)
+            continue
         row = p // columns
         column = p - row * columns
         x = ti.cast(column * supersample + supersample // 2, ti.f32) + ti.f32(0.5)
@@ -129,14 +196,15 @@ def measure_veil(
             # 16 turns in a 4 x 4 tile, neighbours far apart; the blur over 4 x 4 pixels then sees each once
             turn = ((row & 3) * 4 + (column & 3)) * 7 % TURNS
             first = turn * (pairs + taps)
-            openness = open_sky(x, y, z, first, pairs, reach, lens, width, height, pattern, depth)
+            openness = open_sky(x, y, z, first, ti.cast(needed[1], ti.i32), reach, lens, width, height, pattern, depth)
             side, above = view_offset(x, y, z, lens)
             spot = vec3(side, above, z) - light_origin
             u = light_lens[2] + light_lens[0] * spot.dot(light_right)
             v = light_lens[3] - light_lens[0] * spot.dot(light_up)
             limit = spot.dot(light_forward) - ti.select(on_ground, ti.f32(0.0), bias)
-            lit = ti.f32(0.0)
-            for k in range(taps):
+            samples = ti.cast(needed[2], ti.i32)
+            lit = ti.cast(taps - samples, ti.f32)
+            for k in range(samples):
                 arm = pattern[first + pairs + k]
                 i = ti.floor(u + softness * arm[2] * arm[0], ti.i32)
                 j = ti.floor(v + softness * arm[2] * arm[1], ti.i32)

@@ -23,6 +23,8 @@ NO_PARTICLE = 0x7FFFFFFF
 SLACK = 1e-3  # radii by which two kernels' depths may differ: near a silhouette, Vulkan rounds the same root that differently
 SMALLEST = 0.71  # [pixels] radius below which a sphere could fall between pixel centres and vanish
 TILE = 8  # [pixels] side of the tiles that hidden spheres are found by
+FEW = 10_000  # spheres up to which looking for hidden ones takes longer than drawing them
+BROAD = 32  # [pixels] side of the tiles by which empty parts of a picture are found
 STRIDES = (16, 4, 2, 1)  # one of so many spheres is drawn at first, which hides most of the others
 
 
@@ -145,6 +147,58 @@ def measure_tiles(depth: Ints, width: ti.i32, height: ti.i32, tiles: Ints):
             for x in range(column, ti.min(column + TILE, width)):
                 farthest = ti.max(farthest, depth[y * width + x])
         tiles[t] = farthest
+
+
+@ti.kernel
+def mark_tiles(sprites: Vectors4, count: ti.i32, width: ti.i32, height: ti.i32, sums: Ints):
+    """Set the entry of every broad tile that a sphere touches to 1; see `sum_tiles` for their places."""
+    columns = tiles_across(width) + 1
+    for i in range(count):
+        sprite = sprites[i]
+        if sprite[3] > 0:
+            left = ti.max(ti.cast(sprite[0] - sprite[3], ti.i32), 0) // BROAD
+            right = ti.min(ti.cast(sprite[0] + sprite[3], ti.i32), width - 1) // BROAD
+            top = ti.max(ti.cast(sprite[1] - sprite[3], ti.i32), 0) // BROAD
+            bottom = ti.min(ti.cast(sprite[1] + sprite[3], ti.i32), height - 1) // BROAD
+            for row in range(top, bottom + 1):
+                for column in range(left, right + 1):
+                    sums[(row + 1) * columns + column + 1] = 1
+
+
+@ti.kernel
+def sum_tiles(width: ti.i32, height: ti.i32, sums: Ints):
+    """Sum over rows and columns: entry (n, m) then counts the marked tiles in the first n rows and m columns."""
+    columns = tiles_across(width) + 1
+    rows = tiles_across(height) + 1
+    for row in range(rows):
+        for column in range(1, columns):
+            k = row * columns + column
+            sums[k] = sums[k] + sums[k - 1]  # `+=` would be atomic
+    for column in range(columns):
+        for row in range(1, rows):
+            k = row * columns + column
+            sums[k] = sums[k] + sums[k - columns]
+
+
+@ti.func
+def tiles_across(length):
+    """Number of broad tiles along a side of `length` [pixels]."""
+    return (length + BROAD - 1) // BROAD
+
+
+@ti.func
+def is_marked(x, y, reach, width, height, sums: ti.template()):
+    """Whether any pixel within `reach` [pixels] of (x, y) along both axes lies in a marked tile."""
+    columns = tiles_across(width) + 1
+    left = ti.cast(ti.max(x - reach, ti.f32(0.0)), ti.i32) // BROAD
+    right = ti.cast(ti.min(x + reach, ti.cast(width - 1, ti.f32)), ti.i32) // BROAD + 1
+    top = ti.cast(ti.max(y - reach, ti.f32(0.0)), ti.i32) // BROAD
+    bottom = ti.cast(ti.min(y + reach, ti.cast(height - 1, ti.f32)), ti.i32) // BROAD + 1
+    found = False
+    if left < right and top < bottom:
+        upper = sums[top * columns + right] - sums[top * columns + left]
+        found = sums[bottom * columns + right] - sums[bottom * columns + left] > upper
+    return found
 
 
 @ti.kernel

@@ -104,6 +104,8 @@ class Splatter:
         self._tiles = Buffer(ti.i32, _tile_count(*self._fine))
         self._shadow_depth = Buffer(ti.i32, self.quality.shadow_size**2)
         self._shadow_tiles = Buffer(ti.i32, _tile_count(self.quality.shadow_size, self.quality.shadow_size))
+        self._spheres = Buffer(ti.i32, _sums_count(*self._fine))
+        self._shaded = Buffer(ti.i32, _sums_count(self.quality.shadow_size, self.quality.shadow_size))
         self._veil, self._smooth_veil = (ti.Vector.ndarray(3, ti.f32, pixels) for _ in range(2))
         self._linear = Buffer(ti.f32, 255 * 4 + 1)  # 8-bit colours fall on entries
         self._linear.from_numpy(srgb_to_linear(np.linspace(0, 1, 255 * 4 + 1)))
@@ -153,12 +155,14 @@ class Splatter:
         clear(self._depth, splat_kernels.FAR)
         clear(self._nearest, splat_kernels.NO_PARTICLE)
         clear(self._lines, 0)
+        clear(self._spheres, 0)
+        clear(self._shaded, 0)
         if self.shadows and not flat and count:
             self._project(count, radius, light_eye, light_basis, light_lens)
-            self._splat(count, light_lens, (size, size), self._shadow_tiles, self._shadow_depth)
+            self._splat(count, light_lens, (size, size), self._shadow_tiles, self._shaded, self._shadow_depth)
         if count:
             self._project(count, radius, eye, basis, lens)
-            self._splat(count, lens, self._fine, self._tiles, self._depth, self._nearest)
+            self._splat(count, lens, self._fine, self._tiles, self._spheres, self._depth, self._nearest)
         if outline is not None:
             self._trace(outline, camera, lens, radius)
         extent = float(np.linalg.norm(box[1] - box[0]))
@@ -166,22 +170,34 @@ class Splatter:
         reach = max(5 * radius, 0.03 * extent)
         texel = 1.0 / light_lens[0]
         softness = max(0.012 * extent / texel, 1.5)
+        light_frame = (basis @ (light_eye - eye), *(light_basis @ basis.T))
+        size_and_samples = (width, height, self.supersample, self.quality.pairs, self.quality.taps)
+        shade_kernels.count_samples(
+            self._depth,
+            self._spheres,
+            self._shaded,
+            lens,
+            *ground,
+            *light_frame[:3],
+            light_lens,
+            size,
+            softness,
+            reach,
+            *size_and_samples,
+            self._veil,
+        )
         shade_kernels.measure_veil(
             self._depth,
             self._shadow_depth,
             lens,
             *ground,
-            *(basis @ (light_eye - eye), *(light_basis @ basis.T)),
+            *light_frame,
             light_lens,
             size,
             softness,
             3 * radius + (softness + 1) * texel,
             reach,
-            width,
-            height,
-            self.supersample,
-            self.quality.pairs,
-            self.quality.taps,
+            *size_and_samples,
             self._pattern,
             self._veil,
         )
@@ -220,15 +236,22 @@ class Splatter:
     def _project(self, count: int, radius: float, eye, basis, lens) -> None:
         splat_kernels.project_points(self._points, count, radius, eye, *basis, lens, self._sprites)
 
-    def _splat(self, count: int, lens, size: tuple[int, int], tiles, depth, nearest=None) -> None:
-        """Enter the least depths, and what is nearest: few spheres first, then always more that those do not hide."""
+    def _splat(self, count: int, lens, size: tuple[int, int], tiles, sums, depth, nearest=None) -> None:
+        """Enter the least depths, and what is nearest: few spheres first, then always more that those do not hide.
+
+        `sums` then tells where there are any at all.
+        """
+        splat_kernels.mark_tiles(self._sprites, count, *size, sums)
+        splat_kernels.sum_tiles(*size, sums)
         if self._flat:
             self._splat_flat(count, lens, size, depth, nearest)
             return
         splat_kernels.clear_buffer(tiles, splat_kernels.FAR)
-        for stride in splat_kernels.STRIDES:
+        strides = splat_kernels.STRIDES if count > splat_kernels.FEW else (1,)
+        for stride in strides:
             splat_kernels.splat_depths(self._sprites, count, stride, lens, *size, tiles, depth)
-            splat_kernels.measure_tiles(depth, *size, tiles)
+            if len(strides) > 1:
+                splat_kernels.measure_tiles(depth, *size, tiles)
         if nearest is not None:
             splat_kernels.splat_numbers(self._sprites, count, lens, *size, tiles, depth, nearest)
 
@@ -271,3 +294,8 @@ class Splatter:
 def _tile_count(width: int, height: int) -> int:
     side = splat_kernels.TILE
     return -(-width // side) * -(-height // side)
+
+
+def _sums_count(width: int, height: int) -> int:
+    side = splat_kernels.BROAD
+    return (-(-width // side) + 1) * (-(-height // side) + 1)

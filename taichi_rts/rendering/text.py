@@ -55,16 +55,17 @@ def draw_text(canvas: ImageDraw.ImageDraw, place, text: str, size: int, fill) ->
 
 def panel_of(image, box, alpha: int = 225):
     """Return (Pillow image, canvas) of a picture, RGB or RGBA, with a white panel of rounded corners at `box`."""
-    source = Image.fromarray(image)
-    picture = source.convert("RGBA")
-    sheet = Image.new("RGBA", picture.size, (255, 255, 255, 0))
-    corner = max(round(0.012 * picture.size[1]), 2)
+    picture = Image.fromarray(image).copy()
+    x, y = box[:2]
+    place = (x, y, box[2] + 1, box[3] + 1)  # all that the panel changes
+    under = picture.crop(place).convert("RGBA")
+    sheet = Image.new("RGBA", under.size, (255, 255, 255, 0))
     ImageDraw.Draw(sheet).rounded_rectangle(
-        box,
-        corner,
+        (0, 0, box[2] - x, box[3] - y),
+        max(round(0.012 * picture.size[1]), 2),
         fill=(255, 255, 255, alpha),
         outline=(120, 125, 135, 200),
         width=max(picture.size[1] // 720, 1),
     )
-    picture = Image.alpha_composite(picture, sheet).convert(source.mode)
+    picture.paste(Image.alpha_composite(under, sheet).convert(picture.mode), place)
     return picture, ImageDraw.Draw(picture)

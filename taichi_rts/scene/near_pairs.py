@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-PART = 20_000
-"""Particles whose pairs are found at a time, to save memory: one has some 100 pairs in three dimensions."""
+PART = 5_000
+"""Particles whose pairs are found at a time, to save memory: one has some 200 in the cells around it in three dimensions."""
 
 
 def near_pairs(
@@ -18,23 +18,29 @@ def near_pairs(
     Positions `x` and `others` [m] are (N, dim) and (M, dim); without `others` pairs are within `x`: each then comes twice, and
     every particle once with itself. Images across periodic faces are not looked at.
     """
-    # Not at the top: most runs need no pairs, and its import takes longer than NumPy's.
-    from scipy.spatial import cKDTree
-
     one = x.astype(np.float64)
     two = one if others is None else others.astype(np.float64)
     if not len(one) or not len(two):
         return
-    tree = cKDTree(two)
+    # Cells around those of `two`, a little larger than the support, in rows along x: three of them are one range.
+    lower, side = two.min(axis=0), 1.000001 * support
+    cell = np.floor((two - lower) / side).astype(np.int64) + 1
+    strides = np.cumprod([1, *(cell.max(axis=0) + 2)[:-1]])
+    key = cell @ strides
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    rows = np.stack(np.meshgrid(*[[-1, 0, 1]] * (x.shape[1] - 1), indexing="ij"), axis=-1).reshape(-1, x.shape[1] - 1)
     for start in range(0, len(one), PART):
-        # A little more than the support, and then those that are nearer by the same arithmetic as everywhere.
-        part = cKDTree(one[start : start + PART]).sparse_distance_matrix(
-            tree, 1.000001 * support, output_type="ndarray"
-        )
-        i, j = part["i"] + start, part["j"]
-        distance2 = ((one[i] - two[j]) ** 2).sum(axis=1)
+        part = one[start : start + PART]
+        place = np.clip(np.floor((part - lower) / side), -1, cell.max(axis=0)).astype(np.int64) + 1
+        middle = (place @ strides)[:, None] + rows @ strides[1:]
+        first, end = np.searchsorted(key, middle - 1), np.searchsorted(key, middle + 1, side="right")
+        counts = (end - first).ravel()
+        i = np.repeat(np.arange(len(part)), (end - first).sum(axis=1))
+        j = order[np.arange(len(i)) + np.repeat(first.ravel() - np.cumsum(counts) + counts, counts)]
+        distance2 = ((part[i] - two[j]) ** 2).sum(axis=1)
         near = distance2 < support**2
-        yield i[near], j[near], distance2[near]
+        yield i[near] + start, j[near], distance2[near]
 
 
 def mean_neighbours(x: np.ndarray, support: float) -> float:
@@ -45,7 +51,9 @@ def mean_neighbours(x: np.ndarray, support: float) -> float:
 
 def nearest_pair(x: np.ndarray, limit: float) -> tuple[float, int, int] | None:
     """Return distance [m] and places of the two of `x` [m], (N, dim), that are nearest to each other, if below `limit` [m]."""
-    from scipy.spatial import cKDTree  # as above
+    from scipy.spatial import (
+        cKDTree,
+    )  # not at the top: most runs need no tree, and its import takes longer than NumPy's
 
     if len(x) < 2:
         return None

@@ -70,10 +70,12 @@ def counted(solver):
     )
 
 
-POOL = dict(fluids=(rts.Block((0.0, 0.0), (1.0, 0.5)),), domain=rts.Box((0.0, 0.0), (1.0, 1.0)), spacing=0.05)
-TANK = dict(
-    fluids=(rts.Block((0.0, 0.0, 0.0), (1.0, 0.4, 0.6)),), domain=rts.Box((0.0, 0.0, 0.0), (1.0, 1.0, 0.6)), spacing=0.1
-)
+POOL = {"fluids": (rts.Block((0.0, 0.0), (1.0, 0.5)),), "domain": rts.Box((0.0, 0.0), (1.0, 1.0)), "spacing": 0.05}
+TANK = {
+    "fluids": (rts.Block((0.0, 0.0, 0.0), (1.0, 0.4, 0.6)),),
+    "domain": rts.Box((0.0, 0.0, 0.0), (1.0, 1.0, 0.6)),
+    "spacing": 0.1,
+}
 PISTON = rts.MovingWall("x-", (0.0, 1.0), (0.0, 0.1))
 BLADE = rts.BoxObstacle((0.2, 0.6), (0.4, 0.7), motion=rts.ConstantMotion(angular_velocity=3.0))
 ROLLER = rts.SphereObstacle((0.5, 0.7, 0.3), 0.15, motion=rts.ConstantMotion((0.1, 0.0, 0.0), (0.0, 0.0, 3.0)))

@@ -160,8 +160,8 @@ def test_a_buffer_beyond_32_bit_addresses_is_refused(monkeypatch):
     monkeypatch.setattr(ti, "field", lambda *args, **options: made.append(args))
     monkeypatch.setattr(ti.Vector, "field", lambda *args, **options: made.append(args))
     message = (
-        r"needs 4\.\d+ GiB for the grid and what neighbours see with spacing [\d.e-]+, and kernels address no more than 4 GiB at a time on "
-        r"vulkan; use a spacing of at least [\d.e-]+, or use --arch cuda or cpu"
+        r"needs 4\.\d+ GiB for the grid and what neighbours see with spacing [\d.e-]+, and kernels address no more than "
+        r"4 GiB at a time on vulkan; use a spacing of at least [\d.e-]+, or use --arch cuda or cpu"
     )
     with pytest.raises(rts.Error, match=message) as caught:
         resources.require(huge, [rts.Uniform()], vulkan)
@@ -173,3 +173,15 @@ def test_a_buffer_beyond_32_bit_addresses_is_refused(monkeypatch):
         resources.require(huge, [rts.Uniform()], Backend(arch, "f32"))
     with pytest.raises(rts.Error, match="more than 4 GiB at a time"):  # whose state is larger
         resources.require(huge.replace(spacing=best), [rts.Asynchronous()], vulkan)
+
+
+def test_a_domain_that_the_water_does_not_fill_is_named(monkeypatch):
+    hall = rts.Scene(domain=rts.Box((0, 0, 0), (100, 100, 100)), fluids=[rts.Block((0, 0, 0), (1, 1, 1))], spacing=0.1)
+    monkeypatch.setattr(resources, "free_host_memory", lambda: 2.0**30)
+    message = (
+        r"domain of 100 x 100 x 100 m has 2.6e\+08 cells and its walls, of which the water fills 1e-06: make the domain"
+    )
+    with pytest.raises(rts.Error, match=message):
+        resources.require(hall, [rts.Uniform()], CPU)
+    with pytest.raises(rts.SceneError, match=message.replace("2.6e\\+08", r"3.9e\+09")):
+        hall.replace(spacing=0.04)

@@ -47,6 +47,25 @@ def size_of(scene: SceneScales, spacing: float | None = None) -> SceneSize:
     )
 
 
+SPARSE = 0.01
+"""Share of the domain that the water fills, below which the domain is what makes a scene large."""
+
+
+def remedy(scene: SceneScales, best: float) -> str:
+    """Say how to make `scene` smaller: by a smaller domain where the water is lost in it, by a spacing of at least `best` [m]."""
+    found = [f"use a spacing of at least {best:g}"] if math.isfinite(best) else []
+    share = scene.spacing**scene.dim * size_of(scene).particles / math.prod(scene.domain.size)
+    if share < SPARSE:
+        sides = " x ".join(f"{length:g}" for length in scene.domain.size)
+        cells = CELLS_PER_BLOCK * size_of(scene).blocks
+        found.insert(
+            0,
+            f"the domain of {sides} m has {cells:.2g} cells and its walls, of which the water fills {share:.1g}: make the domain "
+            "smaller",
+        )
+    return ", or ".join(found) or "free some, or make the scene smaller"
+
+
 def _flowing_in(scene: SceneScales, inflow: Any, spacing: float) -> float:
     patch = math.prod(
         (b - a) / spacing for d, (a, b) in enumerate(zip(inflow.lower, inflow.upper, strict=True)) if d != inflow.axis
@@ -87,7 +106,7 @@ def size_faults(scene: SceneScales) -> list[str]:
     best = finest_spacing(lambda s: max(counts(s).values()) <= MOST, scene.spacing)
     return [
         f"spacing: {scene.spacing:g} makes {found[name]:.3g} {name}, more than the {MOST} that 32 bits count; "
-        f"use a spacing of at least {best:g}, or a smaller scene"
+        f"{remedy(scene, best)}, or a smaller scene"
     ]
 
 

@@ -13,7 +13,6 @@ from typing import Any
 
 from taichi_rts.errors import SceneError
 from taichi_rts.scene.files.gravity_tables import with_gravity_table
-from taichi_rts.scene.files.splishsplash import from_splishsplash, is_splishsplash
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -21,6 +20,8 @@ else:
     import tomli as tomllib
 
 SUFFIXES = (".toml", ".json")
+SPLISHSPLASH = {"Configuration", "FluidBlocks", "FluidModels", "RigidBodies"}
+"""Keys of which any makes the data of a JSON file a SPlisHSPlasH scene."""
 LARGEST_FILE = 1 << 20
 """Bytes that a scene file may have: what is longer belongs into a file of particles or a mesh."""
 
@@ -50,7 +51,9 @@ def read_scene_file(path: Path) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise SceneError(f"scene file {str(path)!r} holds a {type(data).__name__}; a scene is a table of keys")
     name = {"name": name_for(path)}
-    if is_splishsplash(data):
+    if data.keys() & SPLISHSPLASH:
+        from taichi_rts.scene.files.splishsplash import from_splishsplash  # only here: its models take long to build
+
         return name | from_splishsplash(data, path)
     return with_files_beside(name | data, path)
 

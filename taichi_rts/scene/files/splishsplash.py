@@ -46,11 +46,6 @@ Named = tuple[str, dict[str, Any]]
 """Plain data of a fluid, and the name of its material."""
 
 
-def is_splishsplash(data: Any) -> bool:
-    """Whether the data of a JSON file is such a scene."""
-    return isinstance(data, dict) and bool(data.keys() & {"Configuration", "FluidBlocks", "FluidModels", "RigidBodies"})
-
-
 def from_splishsplash(data: dict[str, Any], path: Path) -> dict[str, Any]:
     """Return plain data of a scene, from the data of the SPlisHSPlasH file `path`; warns once of what is not honoured.
 

@@ -39,3 +39,17 @@ def test_errors_still_say_where(taichi_cpu_f64):
 
     with pytest.raises(ti.TaichiCompilationError, match=r'(?s)test_source_cache\.py", line \d+, in wrong.*nowhere\(\)'):
         wrong()
+
+
+def test_kernels_of_classes_are_told_from_others():
+    @ti.kernel
+    def alone(): ...
+
+    @ti.data_oriented
+    class Holder:
+        @ti.kernel
+        def inside(self): ...
+
+    assert kernel_impl._inside_class is source_cache.is_in_class
+    assert not alone._is_classkernel
+    assert vars(Holder)["inside"]._is_classkernel

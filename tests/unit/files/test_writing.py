@@ -1,10 +1,12 @@
 import json
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from taichi_rts.assembly.frame_times import frame_times
 from taichi_rts.errors import OutputError
-from taichi_rts.files.writing import prepare_folder, write_bytes, write_json
+from taichi_rts.files.writing import prepare_folder, write_bytes, write_json, write_png
 
 
 def test_write_leaves_no_temporary_and_replaces_whole_file(tmp_path):
@@ -57,3 +59,14 @@ def test_frames_are_at_exact_times_and_end_at_the_end():
     assert len(frame_times(1.5, 60)) == 91
     with pytest.raises(OutputError, match="export_fps"):
         frame_times(1.0, 0.0)
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+def test_a_picture_is_read_as_it_was_written(tmp_path, channels):
+    wide = np.random.default_rng(0).integers(0, 256, (7, 22, channels), np.uint8)
+    for number, image in enumerate((wide, wide[:1, :1], wide[:, ::2])):  # the last is not contiguous
+        write_png(tmp_path / f"{number}.png", image)
+        found = Image.open(tmp_path / f"{number}.png")
+        found.load()
+        assert np.array_equal(np.asarray(found), image)
+        assert found.mode == {3: "RGB", 4: "RGBA"}[channels]

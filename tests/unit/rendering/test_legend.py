@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
+from PIL import Image, ImageDraw
 
 from taichi_rts.errors import RenderError
 from taichi_rts.rendering.legend import draw_colour_bar, draw_legend, hstack_panels, vstack_panels
-from taichi_rts.rendering.text import font_size, text_width
+from taichi_rts.rendering.text import font_size, panel_of, text_width
 
 ENTRIES = [("level 1", (1.0, 0.0, 0.0), 0.25), ("level 2", (0.0, 0.0, 1.0), 0.75)]
 LINES = ["t = 0.500 s", "Δt_b = 0.54 ms"]
@@ -96,3 +97,14 @@ def test_misfits_are_refused():
         vstack_panels([np.zeros((9, 9, 3), np.uint8)], ["a", "b"])
     with pytest.raises(RenderError, match="top-left"):
         draw_legend(blank(), "x", [], [], "middle")
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+def test_a_panel_is_laid_over_the_picture(channels):
+    image = np.random.default_rng(0).integers(0, 256, (90, 160, channels), np.uint8)
+    box = (11, 7, 80, 60)
+    found, _ = panel_of(image, box)
+    sheet = Image.new("RGBA", (160, 90), (255, 255, 255, 0))
+    ImageDraw.Draw(sheet).rounded_rectangle(box, 2, fill=(255, 255, 255, 225), outline=(120, 125, 135, 200), width=1)
+    source = Image.fromarray(image)
+    assert np.array_equal(found, Image.alpha_composite(source.convert("RGBA"), sheet).convert(source.mode))

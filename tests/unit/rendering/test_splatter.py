@@ -244,3 +244,27 @@ def test_vulkan_draws_what_the_processor_draws(start_taichi):
         with start_taichi(arch):
             pictures.append(Splatter(WIDTH, HEIGHT).draw(positions, colours, 0.2, FRONT, box).astype(int))
     assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 2).mean() < 1e-3
+
+
+@pytest.mark.parametrize("camera", [FRONT, Camera((4, 6, 9), (0, 0, 0), field_of_view=40.0)])
+def test_samples_are_left_out_only_where_they_would_find_nothing(splatter, monkeypatch, camera):
+    positions, colours = cloud(40)
+    picture = splatter.draw(positions, colours, 0.1, camera, ((-4, -2, -4), (4, 2, 4)))
+    needed = splatter._spheres.to_numpy()[-1], splatter._shaded.to_numpy()[-1]
+    assert 0 < needed[0] < (len(splatter._spheres.to_numpy()))
+
+    def mark_all(width, height, sums):
+        across, down = (length // splat_kernels.BROAD + 1 for length in (width - 1, height - 1))
+        sums.from_numpy(np.outer(np.arange(down + 1), np.arange(across + 1)).ravel().astype(np.int32))
+
+    monkeypatch.setattr(splat_kernels, "sum_tiles", mark_all)
+    whole = splatter.draw(positions, colours, 0.1, camera, ((-4, -2, -4), (4, 2, 4)))
+    assert splatter._shaded.to_numpy()[-1] > needed[1]
+    assert np.array_equal(picture, whole)
+
+
+def test_few_spheres_are_drawn_in_one_pass_with_the_same_pixels(splatter, monkeypatch):
+    positions, colours = cloud(300)
+    picture = splatter.draw(positions, colours, 0.3, FRONT)
+    monkeypatch.setattr(splat_kernels, "FEW", 0)
+    assert np.array_equal(splatter.draw(positions, colours, 0.3, FRONT), picture)
