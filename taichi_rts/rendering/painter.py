@@ -88,21 +88,22 @@ def make_cameras(scene: Scene, options: PictureOptions) -> list[Camera]:
 
 
 def make_camera(scene: Scene, options: PictureOptions, name: ViewName = "scene") -> Camera:
-    """Return the camera of a view that frames the domain; "scene" is the scene's own, with the options' angles."""
+    """Return the camera of a view that frames the domain, with `Scene.up` upwards; "scene" is the scene's own, with the options' angles."""
     width, height = options.view_size
     if name in VIEWS:
         azimuth, elevation = VIEWS[name]
         box = scene.domain.lower, scene.domain.upper
-        return Camera.framing(*box, azimuth, elevation, width / height, perspective=False)
+        return Camera.framing(*box, azimuth, elevation, width / height, scene.up, perspective=False)
     view = scene.view
     if view.eye is not None and view.target is not None and options.azimuth is None and options.elevation is None:
-        return Camera(view.eye, view.target)
+        return Camera(view.eye, view.target, scene.up)
     camera = Camera.framing(
         scene.domain.lower,
         scene.domain.upper,
         azimuth=view.azimuth if options.azimuth is None else options.azimuth,
         elevation=view.elevation if options.elevation is None else options.elevation,
         aspect=width / height,
+        up=scene.up,
     )
     return camera.zoomed(1.0 / view.zoom) if view.zoom != 1.0 else camera
 
