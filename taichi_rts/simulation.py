@@ -6,7 +6,7 @@ import contextlib
 import time as clock
 import weakref
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from PIL import Image
@@ -25,13 +25,16 @@ from taichi_rts.errors import Error, Interrupted, SimulationDivergedError, TimeE
 from taichi_rts.readings.diagnosis import diagnose
 from taichi_rts.readings.readers import Readers
 from taichi_rts.readings.reading import Moment, Reading
-from taichi_rts.rendering.painter import Painter, PictureOptions
+from taichi_rts.rendering.painter import Painter, PictureChoices, picture_options
 from taichi_rts.sampling.sampling import sample
 from taichi_rts.scene.placing import at_origin, origin_of
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.physics.own_forces import own_forces
 from taichi_rts.solver.stepping.base import Stepper
-from taichi_rts.solver.stepping.regional import Regional
+from taichi_rts.solver.stepping.steppers import as_stepper
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack  # in `typing` from Python 3.11 on
 
 OnFrame = Callable[["Simulation"], object]
 
@@ -56,9 +59,10 @@ class Simulation(Readers):
     """A scene, a stepper, and the state in between.
 
     Call `taichi_rts.init` first, in the same thread; it may run in any. Another `init` ends it: what is then asked of it raises
-    `BackendError`. Building one compiles its kernels and evaluates the first forces. With `debug` the stepper
-    checks at every step what is true by construction, and raises `AssertionError` where it is not; and the walls' impulse is
-    added up. `forces` are a user's own: body forces and pair forces (docs/extending.md); `energy` knows no potential of theirs.
+    `BackendError`. Building one compiles its kernels and evaluates the first forces. `stepper` may be a stepper's name: it then
+    has its defaults. With `debug` the stepper checks at every step what is true by construction, and raises `AssertionError`
+    where it is not; and the walls' impulse is added up. `forces` are a user's own: body forces and pair forces
+    (docs/extending.md); `energy` knows no potential of theirs.
 
     Attributes:
         scene: what is simulated, with "auto" decided.
@@ -72,7 +76,7 @@ class Simulation(Readers):
     def __init__(
         self,
         scene: Scene,
-        stepper: Stepper | None = None,
+        stepper: Stepper | str | None = None,
         *,
         forces: Sequence[Any] = (),
         debug: bool = False,
@@ -80,7 +84,7 @@ class Simulation(Readers):
     ) -> None:
         self.backend = backends.current()
         self.taichi_start = backends.start_for_fields()
-        self.stepper = stepper if stepper is not None else cast(Stepper, Regional())
+        self.stepper = as_stepper(stepper)
         own = own_forces(forces, origin_of(scene))
         self.forces = tuple(forces)
         self.scene = scene.with_sound_for(self.stepper)
@@ -184,9 +188,12 @@ class Simulation(Readers):
         """
         _require_whole(self.read())
 
-    def show(self, **options: Any) -> Image.Image:
-        """Return a picture of the present state, which a notebook shows; `options` are those of `PictureOptions`."""
-        return Image.fromarray(Painter(self.scene, PictureOptions(**options)).paint(self))
+    def show(self, **options: Unpack[PictureChoices]) -> Image.Image:
+        """Return a picture of the present state, which a notebook shows; `options` are those of `PictureOptions`.
+
+        Raises `RenderError` for an option or a value that there is not.
+        """
+        return Image.fromarray(Painter(self.scene, picture_options(**options)).paint(self))
 
     def __repr__(self) -> str:
         stepper = type(self.stepper).__name__

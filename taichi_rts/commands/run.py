@@ -24,6 +24,7 @@ from taichi_rts.output.resume import (
     open_checkpoint,
     output_folder,
 )
+from taichi_rts.output.turning import UpAxis
 from taichi_rts.readings.extremes import Extremes
 from taichi_rts.rendering.painter import Mode, PictureOptions, ViewName, make_cameras
 from taichi_rts.scene.checks.size import warn_of_size
@@ -125,6 +126,8 @@ class Run:
     """Also write particles at each frame, in any of vtu, ply, npz, bgeo, vtkhdf, and the water's surface (docs/files.md)."""
     attributes: tuple[str, ...] = DEFAULT_ATTRIBUTES
     """What files say of each particle: any of id, velocity, density, pressure, level, step, cell_time, sound_speed, fluid."""
+    up: UpAxis | None = None
+    """Turn what --export writes so that this axis is up, against gravity: z for Blender, y for Houdini."""
     strict: bool = False
     """Exit with 3 if a run has blown up or was not weakly compressible: what the table marks red."""
     debug: bool = False
@@ -180,6 +183,7 @@ class Run:
             gif=self.gif,
             export=self.export,
             attributes=self.attributes,
+            up=self.up,
             checkpoint_every=self.checkpoint_every,
             command=command_data(self),
         )
@@ -192,6 +196,7 @@ class Run:
             make_cameras(scene, dataclasses.replace(self.picture(), **panel.options))
         with Interrupts() as interrupts:
             device = rts.init(self.arch, self.precision or "f32", restart=True)
+            report.announce(scene, len({panel.stepper for panel in panels}), device)
             with Recorder(
                 scene, panels, self.picture(), recording, debug=self.debug, checkpoint=checkpoint
             ) as recorder:
@@ -201,7 +206,7 @@ class Run:
                     with checkpoint.archive.trusted_by_nobody():
                         extremes.take(checkpoint.extra["extremes"])
                 interrupts.defer()
-                with report.progress(recorder.runs, scene.end_time, device, extremes.look) as on_frame:
+                with report.progress(recorder.runs, scene.end_time, extremes.look) as on_frame:
                     recorder.record(scene.end_time, on_frame, interrupts.asked)
         for stepper, sim in recorder.runs.items():
             report.print_table(
@@ -267,6 +272,7 @@ STEPPER_OPTIONS = sorted(
 """Options of `Run` that are some stepper's parameters."""
 NOT_IN_WINDOW = (
     *("panels", "debug", "strict", "resume", "checkpoint_every", "frames", "video", "gif", "export", "attributes"),
+    "up",
     *("views", "quality", "transparent"),
 )
 """Options of `Run` that a window refuses. `export_fps` and `overwrite` have no effect there, but demos set the

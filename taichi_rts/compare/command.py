@@ -6,14 +6,12 @@ import dataclasses
 import platform
 import shlex
 import sys
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 import taichi_rts as rts
 from taichi_rts.compare import analysis, folder, references, sweeps, table
@@ -22,7 +20,7 @@ from taichi_rts.compare.runner import COURANTS, Settings, compare, plan
 from taichi_rts.device import forks
 from taichi_rts.errors import Error
 from taichi_rts.scene.scene import Scene
-from taichi_rts.terminal import console
+from taichi_rts.terminal import Progress, console
 from taichi_rts.trials import executors
 from taichi_rts.trials.plotting import require_plots
 
@@ -108,7 +106,7 @@ class Compare:
         folder.prepare(where, resume=self.resume, overwrite=self.overwrite)
         self.announce(scene, settings, len(variants))
         try:
-            with executor as chosen, _bar() as progress:
+            with executor as chosen, Progress(f"compare {scene.name}") as progress:
                 report = compare(scene, settings, folder=where, executor=chosen, progress=progress)
         except KeyboardInterrupt:
             kept = len(list((where / "runs").glob("*.json")))
@@ -182,35 +180,3 @@ class Compare:
 
 def _plain(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
-
-
-class _Bar:
-    """The bar of the command line: what runs now, and how much of the work is done."""
-
-    def __init__(self, progress: Progress) -> None:
-        self.progress = progress
-        self.task = progress.add_task("", total=None)
-
-    def total(self, weight: float) -> None:
-        """Take note of how much work there is."""
-        self.progress.update(self.task, total=weight)
-
-    def begin(self, description: str) -> None:
-        """Say what runs now."""
-        self.progress.update(self.task, description=description)
-
-    def advance(self, weight: float) -> None:
-        """Take note that so much work is done."""
-        self.progress.advance(self.task, weight)
-
-
-@contextmanager
-def _bar() -> Iterator[_Bar]:
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=console, transient=True) as progress:
-        yield _Bar(progress)

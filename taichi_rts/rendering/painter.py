@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -61,6 +63,42 @@ class PictureOptions:
         return (self.width - (count - 1) * legend.rule_thickness(self.height)) // count, self.height
 
 
+class PictureChoices(TypedDict, total=False):
+    """The fields of `PictureOptions` as keywords, any of them."""
+
+    width: int
+    height: int
+    renderer: Literal["splatter", "ggui"]
+    colour_by: Mode
+    palette: Literal["default", "paper"]
+    azimuth: float | None
+    elevation: float | None
+    legend: bool
+    quality: Literal["draft", "good", "best"]
+    transparent: bool
+    views: tuple[ViewName, ...]
+
+
+def picture_options(**options: Any) -> PictureOptions:
+    """Return `PictureOptions(**options)`; raises `RenderError` for a keyword or a value that is none, with what is meant."""
+    hints = get_type_hints(PictureOptions)
+    for key, value in options.items():
+        _require("picture option", key, hints)
+        if get_origin(hints[key]) is Literal:
+            _require(key, value, get_args(hints[key]))
+    for view in options.get("views", ()):
+        _require("view", view, get_args(ViewName))
+    return PictureOptions(**options)
+
+
+def _require(what: str, name: Any, known: Iterable[str]) -> None:
+    known = list(known)
+    if name not in known:
+        near = difflib.get_close_matches(str(name), known, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise RenderError(f"{what} {name!r} is unknown{hint} (known: {', '.join(known)})")
+
+
 def make_renderer(options: PictureOptions) -> Any:
     """Return the renderer that the options name; both have the same `draw`."""
     if options.renderer == "ggui":
@@ -88,7 +126,10 @@ def make_cameras(scene: Scene, options: PictureOptions) -> list[Camera]:
 
 
 def make_camera(scene: Scene, options: PictureOptions, name: ViewName = "scene") -> Camera:
-    """Return the camera of a view that frames the domain, with `Scene.up` upwards; "scene" is the scene's own, with the options' angles."""
+    """Return the camera of a view that frames the domain, with `Scene.up` upwards.
+
+    "scene" is the scene's own view, with the options' angles.
+    """
     width, height = options.view_size
     if name in VIEWS:
         azimuth, elevation = VIEWS[name]

@@ -9,16 +9,18 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from taichi_rts.errors import OutputError
 from taichi_rts.files.writing import remove, require_folder, write_bytes, write_json
+from taichi_rts.solver.stepping.steppers import setups
 from taichi_rts.stability import chart
 from taichi_rts.stability.cases import CASES
 from taichi_rts.stability.suite import SETTINGS, Cell, Plan, run_plan
-from taichi_rts.terminal import console
+from taichi_rts.terminal import Progress, console
 
 T = TypeVar("T")
+FORMER = {former: name for name, (_, setup) in setups("mapped").items() for former in setup.former}
+"""Names of settings by those that they had before."""
 ARTEFACTS = ("stability.json", "stability.csv", "stability.png", "cells")  # what it writes, and all --overwrite removes
 
 
@@ -33,7 +35,7 @@ class Stability:
     cases: tuple[str, ...] = ()
     """Names of cases; by default all."""
     steppers: tuple[str, ...] = ()
-    """Names of steppers; by default all."""
+    """Names of steppers, as `taichi-rts compare` has them; by default all."""
     tolerance: float = 0.05
     """How close the largest stable and the smallest unstable courant have to be, relative to each other."""
     quick: bool = False
@@ -58,7 +60,7 @@ class Stability:
         if not 0.001 <= self.tolerance <= 1.0:
             raise OutputError(f"tolerance {self.tolerance:g} is not between 0.001 and 1; try 0.05")
         cases = choose("case", self.cases, CASES)
-        settings = choose("stepper", self.steppers, SETTINGS)
+        settings = choose("stepper", [FORMER.get(name, name) for name in self.steppers], SETTINGS)
         plan = Plan(cases, settings, self.tolerance, self.quick, self.arch, self.precision)
         if self.workers < 1:
             raise OutputError(f"workers {self.workers} is below 1; use 1, or as many as there are idle processors")
@@ -78,12 +80,10 @@ class Stability:
 
     def run(self, plan: Plan, cells: list[Cell]) -> None:
         """Run all cells under a progress bar and append them to `cells` as they are done."""
-        columns = [TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()]
-        with Progress(*columns, console=console) as bar:
-            task = bar.add_task("", total=len(plan.cells))
-            for cell in run_plan(plan, self.output_dir, lambda what: bar.update(task, description=what), self.workers):
+        with Progress("stability", len(plan.cells)) as progress:
+            for cell in run_plan(plan, self.output_dir, progress.begin, self.workers):
                 cells.append(cell)
-                bar.advance(task)
+                progress.advance(1)
 
     def write(self, plan: Plan, cells: Sequence[Cell], draws: bool) -> None:
         """Print the map and write it, as far as it is done."""
