@@ -16,6 +16,7 @@ import taichi_rts as rts
 from taichi_rts import importing
 from taichi_rts.benchmarks.command import Bench
 from taichi_rts.commands import report
+from taichi_rts.commands.help import quiet
 from taichi_rts.commands.plain_text import use_plain_text
 from taichi_rts.commands.run import Run
 from taichi_rts.commands.scene_copies import copy_scene, example_names
@@ -56,6 +57,9 @@ class Info:
         """Say it."""
         report.print_info(backend.available())
 
+
+for each in (Run, Compare, Stability, Bench, SideBySide, Scenes):
+    quiet(each)
 
 Command = (
     Annotated[Run, tyro.conf.subcommand("run")]

@@ -10,9 +10,9 @@ from typing import Any, Literal, TypedDict, get_args, get_origin, get_type_hints
 import numpy as np
 
 from taichi_rts.errors import RenderError
-from taichi_rts.readings.levels import level_classes, milliseconds
+from taichi_rts.readings.levels import milliseconds
 from taichi_rts.readings.reading import Readable, Reading
-from taichi_rts.rendering import colours, legend
+from taichi_rts.rendering import legend
 from taichi_rts.rendering.camera import Camera
 from taichi_rts.rendering.obstacles import ObstaclePoints
 from taichi_rts.rendering.tints import Tints
@@ -24,8 +24,6 @@ ViewName = Literal["scene", "front", "side", "top"]
 VIEWS: dict[str, tuple[float, float]] = {"front": (0.0, 0.0), "side": (90.0, 0.0), "top": (0.0, 89.99)}
 """Azimuth and elevation [degrees] of the views without perspective; straight down, there would be no right."""
 MOST_VIEWS = 4
-BAR_STEPS = 64
-LEGEND_ROWS = 8  # with more levels than that the legend leaves out those that no particle has
 
 
 @dataclass(frozen=True)
@@ -182,45 +180,8 @@ class Painter:
         return legend.hstack_panels(images)
 
     def _label(self, image: np.ndarray, now: Reading) -> np.ndarray:
-        mode = self.options.colour_by
+        mode, palette = self.options.colour_by, self.options.palette
         lines = [f"t = {now.time:.3f} s", f"Δt_b = {milliseconds(now.base_step)} ms", f"{now.count:,} particles"]
-        image = legend.draw_legend(image, self.title, self._entries(now), lines)
-        if mode not in BARS:
-            return image
-        title, unit, factor = BARS[mode]
-        scale = self.tints.scale(now, self.options.palette)
-        lower, upper = scale.ends(mode)
-        tints = colours.colour_by(mode, np.linspace(lower, upper, BAR_STEPS), scale)
-        upper = upper if upper > colours.LEAST_TOP else 0.0
-        return legend.draw_colour_bar(image, title, factor * lower, factor * upper, unit, tints)
-
-    def _entries(self, now: Reading) -> list[tuple[str, Any, float]]:
-        """One entry a colour of levels or fluids, with the share of particles that have it now; none in other modes."""
-        palette = self.options.palette
-        if self.options.colour_by == "fluid":
-            tints = colours.fluid_colours(self.scene.fluid_colours, palette)
-            counts = np.bincount(now.fluids, minlength=len(tints)) / max(1, now.count)
-            return [
-                (name, tuple(t), share) for name, t, share in zip(self.scene.fluid_names, tints, counts, strict=True)
-            ]
-        if self.options.colour_by != "level":
-            return []
-        classes = level_classes(now.level_shares, now.levels_double)
-        if now.levels_double and len(classes) > LEGEND_ROWS:
-            classes = [each for each in classes if each.share > 0.0]
-        tints = colours.level_colours([each.first for each in classes], palette, doubling=now.levels_double)
-        return [
-            (f"level {each}: {each} Δt_b" if each.last > 1 else "level 1: Δt_b", tuple(tint), each.share)
-            for each, tint in zip(classes, tints, strict=True)
-        ]
-
-
-BARS: dict[str, tuple[str, str, float]] = {
-    "step": ("step", "ms", 1e3),
-    "lead": ("ahead of the youngest", "ms", 1e3),
-    "speed": ("speed", "m/s", 1.0),
-    "density": ("density", "kg/m^3", 1.0),
-    "sound": ("sound speed", "m/s", 1.0),
-    "pressure": ("pressure", "kPa", 1e-3),
-}
-"""Modes that have a bar of colours: its title, its unit, and how many of them the SI unit is."""
+        image = legend.draw_legend(image, self.title, self.tints.entries(now, mode, palette), lines)
+        bar = self.tints.bar(now, mode, palette)
+        return legend.draw_colour_bar(image, *bar) if bar else image

@@ -67,7 +67,7 @@ def as_stepper(stepper: Stepper | str | None) -> Stepper:
         raise StepperError(
             f"stepper {stepper!r} is none; give e.g. rts.Regional(), or one of {', '.join(STEPPERS)} by name"
         )
-    return stepper
+    return stepper  # type: ignore[return-value]  # any object that has a schedule, as comparisons and tests have
 
 
 def setups(what: str) -> dict[str, tuple[Any, Setup]]:

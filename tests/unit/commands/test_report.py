@@ -71,7 +71,7 @@ def test_table_shows_what_passes_cost(capsys, monkeypatch):
     words = " ".join(capsys.readouterr().out.split())
     for fact in (
         "level ┃ step [ms] ┃ share",
-        "particles 100, spacing 0.02 m",
+        "particles 100, spacing 0.025 m",
         "sound speed 10 m/s",
         "overhead (ε) 10.0% of a full step: work for all particles, due or not",
         "stopped by the domain 0 times a particle, at a face",

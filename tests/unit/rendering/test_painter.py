@@ -1,4 +1,5 @@
 from types import SimpleNamespace
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from taichi_rts.readings.levels import level_classes, milliseconds
 from taichi_rts.readings.reading import Moment, Reading
 from taichi_rts.rendering import legend, lighting
 from taichi_rts.rendering.colours import level_colours, scalar_colours
-from taichi_rts.rendering.painter import Painter, PictureOptions, make_cameras
+from taichi_rts.rendering.painter import Painter, PictureChoices, PictureOptions, make_cameras, picture_options
 from taichi_rts.rendering.tints import Tints
 
 SCENE = rts.load_scene("dam_break_2d")
@@ -48,7 +49,7 @@ def reading(level, count=1, *, doubling=False, density=None, scene=SCENE, tick=0
 
 
 def entries(now):
-    return Painter(SCENE, PictureOptions(), renderer=NOTHING)._entries(now)
+    return Tints(SCENE).entries(now, "level", "default")
 
 
 def test_regional_levels_have_an_entry_each():
@@ -193,3 +194,22 @@ def test_floor_and_ground_lie_across_gravity():
     assert (spot @ across, spot @ along) == pytest.approx((0.5, 0.5))
     plane, _ = lighting.ground_plane(camera, basis, box, 1.0, True)
     np.testing.assert_allclose(plane, [*(basis @ [0, 0, 1]), camera.eye[2]], atol=1e-12)
+
+
+def test_options_are_typed_as_they_are():
+    assert get_type_hints(PictureChoices) == get_type_hints(PictureOptions)
+    assert picture_options(colour_by="speed", views=("top",)) == PictureOptions(colour_by="speed", views=("top",))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"color_by": "speed"}, "picture option 'color_by' is unknown; did you mean 'colour_by'"),
+        ({"colour_by": "sped"}, "colour_by 'sped' is unknown; did you mean 'speed'"),
+        ({"views": ("frontt",)}, "view 'frontt' is unknown; did you mean 'front'"),
+        ({"quality": "high"}, r"quality 'high' is unknown \(known: draft, good, best\)"),
+    ],
+)
+def test_a_wrong_option_is_named_with_what_is_meant(options, said):
+    with pytest.raises(rts.RenderError, match=said):
+        picture_options(**options)

@@ -152,3 +152,27 @@ def test_a_name_means_the_same_stepper_in_comparisons_and_in_the_map():
     assert set(compared) <= set(mapped)
     for name, (kind, setup) in compared.items():
         assert (mapped[name][0], mapped[name][1].parameters) == (kind, setup.parameters), name
+
+
+def test_a_stepper_may_be_given_by_its_name():
+    assert steppers.as_stepper("uniform") == rts.Uniform()
+    assert steppers.as_stepper(None) == rts.Regional()
+    own = rts.Asynchronous(courant=0.3)
+    assert steppers.as_stepper(own) is own
+
+
+@pytest.mark.parametrize(
+    ("stepper", "said"),
+    [
+        ("regionl", "stepper 'regionl' is none of uniform, regional, asynchronous; did you mean 'regional'"),
+        (rts.Regional, r"stepper Regional is a class; give an object of it, Regional\(\)"),
+        (0.4, "stepper 0.4 is none; give e.g. rts.Regional"),
+    ],
+)
+def test_what_is_meant_by_no_stepper_is_said(stepper, said):
+    with pytest.raises(rts.StepperError, match=said):
+        steppers.as_stepper(stepper)
+
+
+def test_the_package_lists_what_is_public():
+    assert set(dir(rts)) == {*rts.__all__, "__version__"}
