@@ -144,9 +144,10 @@ class Progress:
 
     def _beat(self) -> None:
         while not self._over.wait(min(1.0, LINE_SECONDS)):
-            if self.look is not None:
-                self.done = max(self.done, self.look())
-            self._say_if_due()
+            if time.monotonic() - self._said_at >= LINE_SECONDS:
+                if self.look is not None:
+                    self.done = max(self.done, self.look())
+                self._say_if_due()
 
 
 def _clock(seconds: float) -> str:
