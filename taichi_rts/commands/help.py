@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 import tyro
 
 T = TypeVar("T")
+POSITIONAL = get_args(tyro.conf.Positional[int])[1]
 
 
 def quiet(options: type[T]) -> type[T]:
@@ -20,7 +21,9 @@ def quiet(options: type[T]) -> type[T]:
         if dataclasses.is_dataclass(plain):
             quiet(plain)  # type: ignore[arg-type]
         elif field.default is None:
-            said = tyro.conf.arg(metavar=metavar(plain), help_behavior_hint="")
+            positional = any(each is POSITIONAL for each in get_args(hint))
+            name = f"[{field.name.upper()}]" if positional else metavar(plain)
+            said = tyro.conf.arg(metavar=name, help_behavior_hint="")
             options.__annotations__[field.name] = Annotated[hint, said]
         elif field.default == ():
             options.__annotations__[field.name] = Annotated[hint, tyro.conf.arg(help_behavior_hint="")]

@@ -23,3 +23,13 @@ def test_optional_values_are_read_as_before():
     text = repr(run)
     for part in ("spacing=0.1", "limiter=False", "sound_speed='auto'", "alpha=None", "scene='dam_break'"):
         assert part in text
+
+
+@pytest.mark.parametrize("command", ["compare", "stability"])
+def test_help_is_in_groups(command, capsys):
+    with pytest.raises(SystemExit):
+        tyro.cli(Command, args=[command, "--help"])
+    said = capsys.readouterr().out
+    for group in ("files options", "machine options", "What is written, and where."):
+        assert group in said
+    assert "--files." not in said
