@@ -51,6 +51,12 @@ from taichi_rts.solver.stepping.steppers import register_stepper
 from taichi_rts.solver.stepping.uniform import Uniform
 
 __version__ = "0.1.0"
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])
+
+
 __all__ = [
     "Asynchronous",
     "BackendError",

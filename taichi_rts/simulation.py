@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import time as clock
 from collections.abc import Callable, Sequence
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any
 
 from PIL import Image
 
@@ -23,13 +23,16 @@ from taichi_rts.errors import Interrupted, SimulationDivergedError, TimeError
 from taichi_rts.readings.diagnosis import require_whole
 from taichi_rts.readings.gravity_work import MOST_STEPS, next_look, work_between
 from taichi_rts.readings.readers import Readers
-from taichi_rts.rendering.painter import Painter, PictureOptions
+from taichi_rts.rendering.painter import Painter, PictureChoices, picture_options
 from taichi_rts.sampling.sampling import sample
 from taichi_rts.scene.placing import at_origin, origin_of
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.physics.own_forces import own_forces
 from taichi_rts.solver.stepping.base import Stepper
-from taichi_rts.solver.stepping.regional import Regional
+from taichi_rts.solver.stepping.steppers import as_stepper
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack  # in `typing` from Python 3.11 on
 
 OnFrame = Callable[["Simulation"], object]
 
@@ -39,9 +42,10 @@ class Simulation(Readers, Budget, Measured):
     """A scene, a stepper, and the state in between; readers, budgets and parts are those of its base classes.
 
     Call `taichi_rts.init` first, in the same thread; it may run in any. Another `init` ends it: what is then asked of it raises
-    `BackendError`. Building one compiles its kernels and evaluates the first forces. With `debug` the stepper
-    checks at every step what is true by construction, and raises `AssertionError` where it is not; and the walls' impulse is
-    added up. `forces` are a user's own: body forces and pair forces (docs/extending.md); `energy` knows no potential of theirs.
+    `BackendError`. Building one compiles its kernels and evaluates the first forces. `stepper` may be a stepper's name: it then
+    has its defaults. With `debug` the stepper checks at every step what is true by construction, and raises `AssertionError`
+    where it is not; and the walls' impulse is added up. `forces` are a user's own: body forces and pair forces
+    (docs/extending.md); `energy` knows no potential of theirs.
 
     Attributes:
         forces: a user's own.
@@ -53,7 +57,7 @@ class Simulation(Readers, Budget, Measured):
     def __init__(
         self,
         scene: Scene,
-        stepper: Stepper | None = None,
+        stepper: Stepper | str | None = None,
         *,
         forces: Sequence[Any] = (),
         debug: bool = False,
@@ -61,7 +65,7 @@ class Simulation(Readers, Budget, Measured):
     ) -> None:
         self.backend = backends.current()
         self.taichi_start = backends.start_for_fields()
-        self.stepper = stepper if stepper is not None else cast(Stepper, Regional())
+        self.stepper = as_stepper(stepper)
         own = own_forces(forces, origin_of(scene))
         self.forces = tuple(forces)
         self.scene = scene.with_sound_for(self.stepper)
@@ -142,9 +146,12 @@ class Simulation(Readers, Budget, Measured):
                     look(self)
         return self
 
-    def show(self, **options: Any) -> Image.Image:
-        """Return a picture of the present state, which a notebook shows; `options` are those of `PictureOptions`."""
-        return Image.fromarray(Painter(self.scene, PictureOptions(**options)).paint(self))
+    def show(self, **options: Unpack[PictureChoices]) -> Image.Image:
+        """Return a picture of the present state, which a notebook shows; `options` are those of `PictureOptions`.
+
+        Raises `RenderError` for an option or a value that there is not.
+        """
+        return Image.fromarray(Painter(self.scene, picture_options(**options)).paint(self))
 
     def _advance_under_changes(self, time: float) -> None:
         """Run to the last reading before `time` [s] that the work of changes of gravity needs."""

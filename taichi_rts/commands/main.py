@@ -16,9 +16,11 @@ import taichi_rts as rts
 from taichi_rts import importing
 from taichi_rts.benchmarks.command import Bench
 from taichi_rts.commands import report
+from taichi_rts.commands.help import quiet
 from taichi_rts.commands.options import StepperOptions
 from taichi_rts.commands.plain_text import use_plain_text
 from taichi_rts.commands.run import Run
+from taichi_rts.commands.scene_copies import copy_scene, example_names
 from taichi_rts.compare.command import Compare
 from taichi_rts.device import backend
 from taichi_rts.errors import Error
@@ -30,8 +32,10 @@ from taichi_rts.terminal import execute
 
 @dataclasses.dataclass(frozen=True)
 class Scenes:
-    """List the built-in scenes."""
+    """List the built-in scenes, or copy one's file to change it."""
 
+    copy: str | None = None
+    """Write the file of this scene, or of an example, into the present folder; nothing is replaced."""
     schema: bool = False
     """Print the JSON Schema of scene files instead, for editors (docs/scene_files.md)."""
 
@@ -40,7 +44,11 @@ class Scenes:
         if self.schema:
             print(json.dumps(rts.scene_schema(), indent=2))
             return
+        if self.copy is not None:
+            print(", ".join(path.name for path in copy_scene(self.copy, Path())))
+            return
         report.print_scenes([rts.load_scene(name) for name in rts.scene_names()])
+        print(f"Commented examples: {', '.join(example_names())}. To change one: taichi-rts scenes --copy NAME")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,6 +59,9 @@ class Info:
         """Say it."""
         report.print_info(backend.available())
 
+
+for each in (Run, Compare, Stability, Bench, SideBySide, Scenes):
+    quiet(each)
 
 Command = (
     Annotated[Run, tyro.conf.subcommand("run")]

@@ -10,6 +10,7 @@ import tyro
 
 import taichi_rts as rts
 from taichi_rts.output.export import DEFAULT_ATTRIBUTES
+from taichi_rts.output.turning import UpAxis
 from taichi_rts.rendering.painter import PictureOptions
 from taichi_rts.solver.stepping.steppers import STEPPERS, StepperName
 
@@ -108,6 +109,8 @@ class FileOptions:
     """Also write particles at each frame, in any of vtu, ply, npz, bgeo, vtkhdf, and the water's surface (docs/files.md)."""
     attributes: tuple[str, ...] = DEFAULT_ATTRIBUTES
     """What files say of each particle: any of id, velocity, density, pressure, level, step, cell_time, sound_speed, fluid."""
+    up: UpAxis | None = None
+    """Turn what --export writes so that this axis is up, against gravity: z for Blender, y for Houdini."""
 
 
 SWITCHED_ON = {

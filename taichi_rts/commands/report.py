@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from taichi_rts.assembly.work import speedup_bound
@@ -19,9 +18,10 @@ from taichi_rts.device.backend import Backend
 from taichi_rts.medium.energy import Energy
 from taichi_rts.readings.diagnosis import Diagnosis
 from taichi_rts.readings.levels import level_classes, milliseconds
+from taichi_rts.sampling.sampling import fluid_positions
 from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
-from taichi_rts.terminal import console, rate
+from taichi_rts.terminal import Progress, console, rate
 
 NOTABLE_GAIN = 0.01
 """Share of its energy that a run may gain without a warning, as in the conformance tests."""
@@ -30,32 +30,40 @@ LITTLE_ENERGY = 1e-4
 percent."""
 
 
+def announce(scene: Scene, runs: int, device: Backend) -> None:
+    """Say what begins: the first of all takes long, as kernels are compiled and kept for the next run."""
+    count = (
+        f"{sum(map(len, fluid_positions(scene))):,} particles, spacing {scene.spacing:.4g} m, to {scene.end_time:g} s"
+    )
+    each = f", {runs} runs" if runs > 1 else ""
+    console.print(
+        f"{scene.name}: {count}, on {device.arch}{each}; compiling ...", soft_wrap=True, highlight=False, markup=False
+    )
+
+
 @contextmanager
 def progress(
-    runs: Mapping[Any, Simulation], end_time: float, device: Backend, look: Callable[[], None] = lambda: None
+    runs: Mapping[Any, Simulation], end_time: float, look: Callable[[], None] = lambda: None
 ) -> Iterator[Callable[[float], None]]:
-    """Show a bar with physical time, active fraction, updates/s and time left; yields what to call after each frame.
+    """Show how far the runs are, with active fraction and updates/s; yields what to call after each frame, at its time [s].
 
     `look` is called at each frame.
     """
-    first = next(iter(runs.values()))
-    columns = [
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("t = {task.completed:.3f} / {task.total:g} s  {task.fields[work]}"),
-        TimeRemainingColumn(),
-    ]
-    with Progress(*columns, console=console) as bar:
-        label = f"{first.scene.name}: {first.count:,} particles on {device.arch}"
-        task = bar.add_task(label, total=end_time, work="")
+    sims = list(runs.values())
+
+    def reached() -> float:
+        return min(end_time, *(sim.solver.timeline.time for sim in sims))
+
+    with Progress(sims[0].scene.name, end_time, reached) as shown:
+        shown.begin("compiling")
 
         def on_frame(time: float) -> None:
             look()
-            statistics = [sim.statistics for sim in runs.values()]
+            statistics = [sim.statistics for sim in sims]
             updates = sum(s["particle_updates"] for s in statistics)
             seconds = sum(s["wall_seconds"] for s in statistics)
             active = statistics[0]["active_fraction"]
-            bar.update(task, completed=time, work=f"active {active:.0%}  {rate(updates, seconds)}")
+            shown.reach(time, f"t = {time:.3f} of {end_time:g} s, active {active:.0%}, {rate(updates, seconds)}")
 
         yield on_frame
 
@@ -69,7 +77,7 @@ def print_table(
     """Print shares per level, active fraction, updates/s, bound of the speed-up, energy, `more` facts, and a diagnosis."""
     statistics = sim.statistics
     levels = Table(title=f"{sim.scene.name}, {sim.stepper.name} steps", title_justify="left")
-    for heading in ("level", "step [ms]", "share of particles", "share of updates"):
+    for heading in ("level", r"step \[ms]", "share of particles", "share of updates"):
         levels.add_column(heading, justify="right")
     for row in level_rows(sim, statistics):
         levels.add_row(*row)
@@ -80,6 +88,7 @@ def print_table(
     gain, scale = energy.total - work - initial_energy.total, energy_scale(sim)
     drift = gain / abs(initial_energy.total) if initial_energy.total else 0.0
     facts = Table(show_header=False, box=None)
+    facts.add_row("particles", f"{sim.count:,}, spacing {sim.scene.spacing:.4g} m")
     active, base_steps = statistics["active_fraction"], statistics["base_steps"]
     facts.add_row("active fraction", f"{active:.3f}")
     facts.add_row("updates saved", f"{1.0 - active:.1%} over uniform steps of the base step")
@@ -89,7 +98,7 @@ def print_table(
     if overhead is not None:
         passes = statistics.get("passes", base_steps) / max(1, base_steps)
         bound = speedup_bound(active, overhead, passes)
-        facts.add_row("paid by all (ε)", f"{overhead:.1%} of a full step")
+        facts.add_row("overhead (ε)", f"{overhead:.1%} of a full step: work for all particles, due or not")
         facts.add_row("speed-up bound", f"{bound:.2f} over uniform steps of the base step")
     for name, fact in pass_facts(statistics):
         facts.add_row(name, fact)
@@ -110,16 +119,18 @@ def print_table(
         facts.add_row("", "with the work of walls and inflows; --debug tells them apart")
     for name, fact in more:
         facts.add_row(name, fact)
-    if sim.sound is not None:
+    if sim.sound is None:
+        facts.add_row("sound speed", f"{sim.medium.sound_speed:.4g} m/s")
+    else:
         c = sim.sound_speeds()
         facts.add_row("sound speed", f"{c.min():.3g} to {c.max():.3g} m/s at the end, mean {c.mean():.3g}")
         if sim.particles.has_budget:
             facts.add_row("put in by its changes", f"{sim.sound_work():+.3g} J, in the energy above")
     for number, removed in enumerate(statistics.get("removed_by_outlets", [])):
         facts.add_row(f"outlet {number}", f"{removed:,} particles, {removed * sim.medium.mass:.4g} kg")
-    facts.add_row("stopped by the box", f"{statistics['stopped_by_domain']:,} centres")
+    facts.add_row("stopped by the domain", f"{statistics['stopped_by_domain']:,} times a particle, at a face")
     if sim.scene.obstacles:
-        facts.add_row("held by obstacles", f"{statistics['stopped_by_obstacles']:,} times a centre")
+        facts.add_row("stopped by obstacles", f"{statistics['stopped_by_obstacles']:,} times a particle, at a surface")
     if statistics["runaways"]:
         facts.add_row("[bold red]blown up[/]", f"limited {statistics['runaways']:,} times; use a smaller --courant")
     console.print(facts)
@@ -197,10 +208,10 @@ def print_finished(folder: Path, end_time: float) -> None:
 
 def print_scenes(scenes: list[Scene]) -> None:
     """Print a table of scenes."""
-    table = Table("name", "dim", "particles", "end [s]", "what it is")
+    table = Table("name", "dim", "particles", r"end \[s]", "what it is")
     for scene in scenes:
-        count = scene.volume / scene.spacing**scene.dim
-        table.add_row(scene.name, str(scene.dim), f"{count:,.0f}", f"{scene.end_time:g}", scene.description)
+        count = sum(map(len, fluid_positions(scene)))
+        table.add_row(scene.name, str(scene.dim), f"{count:,}", f"{scene.end_time:g}", scene.description)
     console.print(table)
 
 

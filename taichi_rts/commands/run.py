@@ -95,6 +95,7 @@ class Run:
             gif=files.gif,
             export=files.export,
             attributes=files.attributes,
+            up=files.up,
             checkpoint_every=files.checkpoint_every,
             command=command_data(self),
         )
@@ -107,6 +108,7 @@ class Run:
             make_cameras(scene, dataclasses.replace(self.pictures, **panel.options))
         with Interrupts() as interrupts:
             device = rts.init(self.arch, self.precision or "f32", restart=True)
+            report.announce(scene, len({panel.stepper for panel in panels}), device)
             with Recorder(scene, panels, self.pictures, recording, debug=self.debug, checkpoint=checkpoint) as recorder:
                 diagnoses, extremes = recorder.guard, Extremes(recorder.runs)
                 recorder.notes["extremes"] = extremes.data
@@ -114,7 +116,7 @@ class Run:
                     with checkpoint.archive.trusted_by_nobody():
                         extremes.take(checkpoint.extra["extremes"])
                 interrupts.defer()
-                with report.progress(recorder.runs, scene.end_time, device, extremes.look) as on_frame:
+                with report.progress(recorder.runs, scene.end_time, extremes.look) as on_frame:
                     recorder.record(scene.end_time, on_frame, interrupts.asked)
         for stepper, sim in recorder.runs.items():
             report.print_table(
@@ -160,6 +162,7 @@ class Run:
 
 NOT_IN_WINDOW = (
     *("panels", "debug", "strict", "resume", "checkpoint_every", "frames", "video", "gif", "export", "attributes"),
+    "up",
     *("views", "quality", "transparent"),
 )
 """Options of `Run` that a window refuses. `export_fps` and `overwrite` have no effect there, but demos set the

@@ -7,13 +7,12 @@ import platform
 import shlex
 import sys
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 import taichi_rts as rts
 from taichi_rts.compare import analysis, folder, references, sweeps, table
@@ -22,7 +21,7 @@ from taichi_rts.compare.runner import COURANTS, Settings, compare, plan
 from taichi_rts.device import forks
 from taichi_rts.errors import Error
 from taichi_rts.scene.scene import Scene
-from taichi_rts.terminal import console
+from taichi_rts.terminal import Progress, console
 from taichi_rts.trials import executors
 from taichi_rts.trials.plotting import require_plots
 
@@ -39,6 +38,53 @@ ErrorName = Literal[
     "pressure",
     "momentum",
 ]
+
+
+@dataclasses.dataclass(frozen=True)
+class Judging:
+    """How runs are judged."""
+
+    error: ErrorName = "velocities"
+    """By which error runs are judged and plotted."""
+    cost: Literal["wall", "updates"] = "wall"
+    """Against which cost: wall time or particle updates."""
+    samples: int = 40
+    """At how many equal intervals runs are compared."""
+    parted: float = PARTED
+    """Relative L2 difference of velocities above which the two references have diverged: matched errors are taken up to
+    then."""
+    repeats: int = 3
+    """How many times each run is timed; the median counts."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Machine:
+    """Where and how runs are made."""
+
+    arch: Literal["auto", "cuda", "vulkan", "cpu"] = "cpu"
+    """Where the runs are made; references always on the CPU."""
+    precision: Literal["f32", "f64"] = "f32"
+    """Floating-point precision of the runs; references have f64."""
+    workers: int = 1
+    """Runs to make at the same time; more than 1 disturbs wall times."""
+    dask: str | None = None
+    """Address of a Dask scheduler to run on, or local for a cluster here (needs the extra `cluster`)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Files:
+    """What is written, and where."""
+
+    output_dir: Path | None = None
+    """Folder for the results; by default out/compare/SCENE."""
+    cache_dir: Path | None = None
+    """Folder of references; by default $XDG_CACHE_HOME/taichi_rts/references, or ~/.cache in its place."""
+    resume: bool = False
+    """Take the finished runs that are in the output folder, and make the others."""
+    overwrite: bool = False
+    """Replace an earlier comparison in the output folder."""
+    plot: bool = True
+    """Draw work_precision.png (needs the extra `plots`)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,55 +106,29 @@ class Compare:
     """Largest number of base steps in a step, with commas between; short for --set regional.levels=... and asynchronous."""
     set: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     """KEY=VALUE,VALUE: sweep a parameter of a stepper or of the scene, e.g. regional.alpha=0.2,0.4 or scene.sound_speed=30,40."""
-    error: ErrorName = "velocities"
-    """By which error runs are judged and plotted."""
-    cost: Literal["wall", "updates"] = "wall"
-    """Against which cost: wall time or particle updates."""
-    arch: Literal["auto", "cuda", "vulkan", "cpu"] = "cpu"
-    """Where the runs are made; references always on the CPU."""
-    precision: Literal["f32", "f64"] = "f32"
-    """Floating-point precision of the runs; references have f64."""
     spacing: float | None = None
     """Initial particle spacing [m]."""
     particles: str | None = None
     """Number of fluid particles instead of a spacing; by default 500 in two dimensions, 1000 in three."""
     end_time: float | None = None
     """Physical time to run to [s]; by default the scene's own."""
-    samples: int = 40
-    """At how many equal intervals runs are compared."""
-    parted: float = PARTED
-    """Relative L2 difference of velocities above which the two references have diverged: matched errors are taken up to
-    then."""
-    repeats: int = 3
-    """How many times each run is timed; the median counts."""
-    output_dir: Path | None = None
-    """Folder for the results; by default out/compare/SCENE."""
-    cache_dir: Path | None = None
-    """Folder of references; by default $XDG_CACHE_HOME/taichi_rts/references, or ~/.cache in its place."""
-    resume: bool = False
-    """Take the finished runs that are in the output folder, and make the others."""
-    overwrite: bool = False
-    """Replace an earlier comparison in the output folder."""
-    plot: bool = True
-    """Draw work_precision.png (needs the extra `plots`)."""
-    workers: int = 1
-    """Runs to make at the same time; more than 1 disturbs wall times."""
-    dask: str | None = None
-    """Address of a Dask scheduler to run on, or local for a cluster here (needs the extra `cluster`)."""
+    judging: tyro.conf.OmitArgPrefixes[Judging] = dataclasses.field(default_factory=Judging)
+    machine: tyro.conf.OmitArgPrefixes[Machine] = dataclasses.field(default_factory=Machine)
+    files: tyro.conf.OmitArgPrefixes[Files] = dataclasses.field(default_factory=Files)
 
     def __call__(self) -> None:
         """Run it."""
-        if self.plot:
+        if self.files.plot:
             require_plots()
         scene, settings = self.load(), self.settings()
         _, variants = plan(scene, settings)  # what cannot be built is said before anything runs or is written
-        where = self.output_dir if self.output_dir is not None else Path("out") / "compare" / scene.name
+        where = self.files.output_dir if self.files.output_dir is not None else Path("out") / "compare" / scene.name
         executor = self.executor()
         references.prepare_cache(settings.cache or references.default_cache())
-        folder.prepare(where, resume=self.resume, overwrite=self.overwrite)
+        folder.prepare(where, resume=self.files.resume, overwrite=self.files.overwrite)
         self.announce(scene, settings, len(variants))
         try:
-            with executor as chosen, _bar() as progress:
+            with executor as chosen, Progress(f"compare {scene.name}") as progress:
                 report = compare(scene, settings, folder=where, executor=chosen, progress=progress)
         except KeyboardInterrupt:
             kept = len(list((where / "runs").glob("*.json")))
@@ -117,8 +137,8 @@ class Compare:
                 file=sys.stderr,
             )
             raise SystemExit(130) from None
-        report = self.facts() | analysis.analyse(report, self.error, self.cost)
-        written = folder.write(where, report, with_plot=self.plot)
+        report = self.facts() | analysis.analyse(report, self.judging.error, self.judging.cost)
+        written = folder.write(where, report, with_plot=self.files.plot)
         for number in range(len(report["scenes"])):
             for each in table.make_tables(report, number):
                 console.print(each)
@@ -143,19 +163,27 @@ class Compare:
         if self.levels is not None:
             sets += [f"{name}.levels={self.levels}" for name in ("regional", "asynchronous") if name in steppers]
         courants = sweeps.numbers(self.courants, "--courants")
+        judging, machine = self.judging, self.machine
         return Settings(
-            steppers=tuple(steppers), courants=tuple(courants), sets=tuple(sets), samples=self.samples,
-            repeats=self.repeats, parted=self.parted, arch=self.arch, precision=self.precision, cache=self.cache_dir,
-        )  # fmt: skip
+            tuple(steppers),
+            tuple(courants),
+            tuple(sets),
+            samples=judging.samples,
+            repeats=judging.repeats,
+            parted=judging.parted,
+            arch=machine.arch,
+            precision=machine.precision,
+            cache=self.files.cache_dir,
+        )
 
     def executor(self) -> AbstractContextManager[Any]:
         """Return where runs are made; raises `Error` for a missing package or a wrong number."""
-        if self.workers < 1:
-            raise Error(f"--workers {self.workers} is below 1; use 1, or as many as there are idle processors")
-        if self.dask is not None:
+        if self.machine.workers < 1:
+            raise Error(f"--workers {self.machine.workers} is below 1; use 1, or as many as there are idle processors")
+        if self.machine.dask is not None:
             executors.require_dask()
-            return executors.dask(self.dask, self.workers)
-        return executors.processes(self.workers)
+            return executors.dask(self.machine.dask, self.machine.workers)
+        return executors.processes(self.machine.workers)
 
     def announce(self, scene: Scene, settings: Settings, count: int) -> None:
         """Say what was chosen."""
@@ -166,51 +194,25 @@ class Compare:
             highlight=False,
             soft_wrap=True,
         )
-        if self.workers > 1:
+        if self.machine.workers > 1:
             console.print("More than one worker: runs disturb each other's wall times; judge by --cost updates.")
 
     def facts(self) -> dict[str, Any]:
         """Return what the report says about how it was made."""
         return {
             "command": shlex.join(["taichi-rts", *sys.argv[1:]]),
-            "settings": {f.name: _plain(getattr(self, f.name)) for f in dataclasses.fields(self)},
+            "settings": dict(sorted(_options(self))),
             "version": version("taichi_rts"),
             "versions": forks.versions() | {"numpy": version("numpy"), "python": platform.python_version()},
             "device": platform.processor() or platform.machine(),
         }
 
 
-def _plain(value: Any) -> Any:
-    return str(value) if isinstance(value, Path) else value
-
-
-class _Bar:
-    """The bar of the command line: what runs now, and how much of the work is done."""
-
-    def __init__(self, progress: Progress) -> None:
-        self.progress = progress
-        self.task = progress.add_task("", total=None)
-
-    def total(self, weight: float) -> None:
-        """Take note of how much work there is."""
-        self.progress.update(self.task, total=weight)
-
-    def begin(self, description: str) -> None:
-        """Say what runs now."""
-        self.progress.update(self.task, description=description)
-
-    def advance(self, weight: float) -> None:
-        """Take note that so much work is done."""
-        self.progress.advance(self.task, weight)
-
-
-@contextmanager
-def _bar() -> Iterator[_Bar]:
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=console, transient=True) as progress:
-        yield _Bar(progress)
+def _options(group: Any) -> Iterator[tuple[str, Any]]:
+    """Yield name and plain value of every option of a command, also of those in groups."""
+    for field in dataclasses.fields(group):
+        value = getattr(group, field.name)
+        if dataclasses.is_dataclass(value):
+            yield from _options(value)
+        else:
+            yield field.name, str(value) if isinstance(value, Path) else value

@@ -12,6 +12,7 @@ import numpy as np
 
 from taichi_rts.errors import OutputError
 from taichi_rts.files.writing import write_bytes
+from taichi_rts.output.turning import UP, UpAxis, rotation_to, turned
 from taichi_rts.particle_files.formats import FORMATS, require_format
 from taichi_rts.particle_files.frame import ParticleFrame
 from taichi_rts.particle_files.vtu import collection
@@ -78,7 +79,8 @@ class Exporter:
     """Writes the particles of a simulation each time it is called, to FOLDER/particles/000000.vtu and so on.
 
     Surfaces go to FOLDER/surface. With "vtu" FOLDER/particles/particles.pvd lists the frames with their times. Files of the
-    same name are replaced. Raises `OutputError` at once for a format or an attribute that cannot be had.
+    same name are replaced. With an axis `up` all is turned so that this axis is against gravity (`Scene.up`). Raises
+    `OutputError` at once for a format, an attribute or an axis that cannot be had.
     """
 
     def __init__(
@@ -88,13 +90,19 @@ class Exporter:
         attributes: Sequence[str] = DEFAULT_ATTRIBUTES,
         *,
         dim: int | None = None,
+        up: UpAxis | None = None,
     ) -> None:
+        if up is not None and up not in UP:
+            raise OutputError(
+                f"--up {up!r} is no axis that points up in other tools; choose y (Houdini) or z (Blender)"
+            )
         self.folder = Path(folder)
         self.formats = {name: require_format(name, dim) for name in dict.fromkeys(formats)}
         self.attributes = tuple(dict.fromkeys(attributes))
         require_attributes(self.attributes)
         self.times: list[float] = []
         """Times [s] of the frames written."""
+        self.up = up
         self.offsets: dict[str, list[float]] = {}
         """Formats that hold positions less an offset, which is this [m]."""
 
@@ -109,6 +117,8 @@ class Exporter:
         frame = capture(state, self.attributes)
         for name in self.formats:
             require_format(name, frame.dim)
+        if self.up is not None:
+            frame = turned(frame, rotation_to(state.read().scene.up, self.up))
         self.times.append(frame.time)
         for name in self.formats:
             if FORMATS[name].single and frame.offset.any() and name not in self.offsets:

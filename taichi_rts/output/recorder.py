@@ -30,6 +30,7 @@ from taichi_rts.output.export import DEFAULT_ATTRIBUTES, Exporter
 from taichi_rts.output.panels import Panel
 from taichi_rts.output.resume import checkpoint_name, newest, output_folder
 from taichi_rts.output.series import Series
+from taichi_rts.output.turning import UpAxis, rotation_to
 from taichi_rts.readings.reading import Reading
 from taichi_rts.rendering import legend
 from taichi_rts.rendering.painter import Painter, PictureOptions, make_renderer
@@ -57,6 +58,7 @@ class Recording:
     gif: bool = False
     export: tuple[str, ...] = ()
     attributes: tuple[str, ...] = DEFAULT_ATTRIBUTES
+    up: UpAxis | None = None
     checkpoint_every: float | None = None
     command: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
@@ -72,9 +74,11 @@ class Recording:
             raise OutputError("--no-frames draws no pictures, of which --video and --gif are made; leave out one")
         if self.attributes != DEFAULT_ATTRIBUTES and not self.export:
             raise OutputError("--attributes chooses what --export writes, and nothing is exported; give --export too")
+        if self.up is not None and not self.export:
+            raise OutputError(f"--up {self.up} turns what --export writes, and nothing is exported; give --export too")
         if self.video:
             require_video()
-        return Exporter(self.folder, self.export, self.attributes, dim=dim)
+        return Exporter(self.folder, self.export, self.attributes, dim=dim, up=self.up)
 
 
 class Recorder:
@@ -307,9 +311,11 @@ class Recorder:
     def files(self) -> dict[str, Any]:
         """Say what is in the folder: paths by kind, where NNNNNN is a frame's number, and the frames' times [s]."""
         wanted = self.recording
-        found = {"frames": "frames/NNNNNN.png"} if wanted.pictures else {}
+        found: dict[str, Any] = {"frames": "frames/NNNNNN.png"} if wanted.pictures else {}
         found |= {name: path for name, path in (("video", "video.mp4"), ("gif", "video.gif")) if getattr(wanted, name)}
         series = [each.path.name for each in self.series]
+        if wanted.up is not None:  # position in the files = rotation @ position in the scene
+            found |= {"up": {"axis": wanted.up, "rotation": rotation_to(self.scene.up, wanted.up).tolist()}}
         return {**found, **self.exporter.files, "series": series, "times": self.times}
 
 

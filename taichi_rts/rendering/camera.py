@@ -78,18 +78,16 @@ class Camera:
         centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
         extent = np.ptp(corners, axis=0)
         if len(corners) == 4:
-            height = float(max(extent[1], extent[0] / aspect)) / MARGIN
             eye = centre + np.array([0.0, 0.0, np.max(extent) + 1.0])
-            return cls(tuple(eye), tuple(centre), orthographic_height=height)
+            camera = cls(tuple(eye), tuple(centre), tuple(up))
+            return replace(camera, orthographic_height=camera._height_of(corners, aspect))
         across, front, upward = _turntable(up)
         az, el = np.radians(azimuth), np.radians(elevation)
         outward = np.cos(el) * (np.sin(az) * across + np.cos(az) * front) + np.sin(el) * upward
         camera = cls(tuple(centre + outward), tuple(centre), tuple(up), field_of_view)
         if not perspective:
-            right, above, _ = camera.basis()
-            height = float(max(np.ptp(corners @ above), np.ptp(corners @ right) / aspect)) / MARGIN
             eye = centre + float(np.linalg.norm(extent)) * outward
-            return replace(camera, eye=tuple(eye), orthographic_height=height)
+            return replace(camera, eye=tuple(eye), orthographic_height=camera._height_of(corners, aspect))
         half_height = np.tan(np.radians(field_of_view) / 2) * MARGIN
         for _ in range(6):  # perspective makes the near side larger: move the box to the middle of the picture
             camera, distance = _back_off(camera, corners, outward, half_height, aspect)
@@ -99,6 +97,11 @@ class Camera:
             target = np.asarray(camera.target) + distance * (middle[0] * right - middle[1] * above)
             camera = replace(camera, eye=tuple(target + distance * outward), target=tuple(target))
         return _back_off(camera, corners, outward, half_height, aspect)[0]
+
+    def _height_of(self, corners: np.ndarray, aspect: float) -> float:
+        """Return the height [m] of a picture in parallel projection that holds the corners, (K, 3) [m]."""
+        right, above, _ = self.basis()
+        return float(max(np.ptp(corners @ above), np.ptp(corners @ right) / aspect)) / MARGIN
 
     def basis(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the unit vectors right, up and forward of the picture."""

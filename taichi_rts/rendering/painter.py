@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from taichi_rts.errors import RenderError
-from taichi_rts.readings.levels import level_classes, milliseconds
+from taichi_rts.readings.levels import milliseconds
 from taichi_rts.readings.reading import Readable, Reading
-from taichi_rts.rendering import colours, legend
+from taichi_rts.rendering import legend
 from taichi_rts.rendering.camera import Camera
 from taichi_rts.rendering.obstacles import ObstaclePoints
 from taichi_rts.rendering.tints import Tints
@@ -22,8 +24,6 @@ ViewName = Literal["scene", "front", "side", "top"]
 VIEWS: dict[str, tuple[float, float]] = {"front": (0.0, 0.0), "side": (90.0, 0.0), "top": (0.0, 89.99)}
 """Azimuth and elevation [degrees] of the views without perspective; straight down, there would be no right."""
 MOST_VIEWS = 4
-BAR_STEPS = 64
-LEGEND_ROWS = 8  # with more levels than that the legend leaves out those that no particle has
 
 
 @dataclass(frozen=True)
@@ -72,6 +72,42 @@ class PictureOptions:
         return (self.width - (count - 1) * legend.rule_thickness(self.height)) // count, self.height
 
 
+class PictureChoices(TypedDict, total=False):
+    """The fields of `PictureOptions` as keywords, any of them."""
+
+    width: int
+    height: int
+    renderer: Literal["splatter", "ggui"]
+    colour_by: Mode
+    palette: Literal["default", "paper"]
+    azimuth: float | None
+    elevation: float | None
+    legend: bool
+    quality: Literal["draft", "good", "best"]
+    transparent: bool
+    views: tuple[ViewName, ...]
+
+
+def picture_options(**options: Any) -> PictureOptions:
+    """Return `PictureOptions(**options)`; raises `RenderError` for a keyword or a value that is none, with what is meant."""
+    hints = get_type_hints(PictureOptions)
+    for key, value in options.items():
+        _require("picture option", key, hints)
+        if get_origin(hints[key]) is Literal:
+            _require(key, value, get_args(hints[key]))
+    for view in options.get("views", ()):
+        _require("view", view, get_args(ViewName))
+    return PictureOptions(**options)
+
+
+def _require(what: str, name: Any, known: Iterable[str]) -> None:
+    known = list(known)
+    if name not in known:
+        near = difflib.get_close_matches(str(name), known, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise RenderError(f"{what} {name!r} is unknown{hint} (known: {', '.join(known)})")
+
+
 def make_renderer(options: PictureOptions) -> Any:
     """Return the renderer that the options name; both have the same `draw`."""
     if options.renderer == "ggui":
@@ -99,21 +135,25 @@ def make_cameras(scene: Scene, options: PictureOptions) -> list[Camera]:
 
 
 def make_camera(scene: Scene, options: PictureOptions, name: ViewName = "scene") -> Camera:
-    """Return the camera of a view that frames the domain; "scene" is the scene's own, with the options' angles."""
+    """Return the camera of a view that frames the domain, with `Scene.up` upwards.
+
+    "scene" is the scene's own view, with the options' angles.
+    """
     width, height = options.view_size
     if name in VIEWS:
         azimuth, elevation = VIEWS[name]
         box = scene.domain.lower, scene.domain.upper
-        return Camera.framing(*box, azimuth, elevation, width / height, perspective=False)
+        return Camera.framing(*box, azimuth, elevation, width / height, scene.up, perspective=False)
     view = scene.view
     if view.eye is not None and view.target is not None and options.azimuth is None and options.elevation is None:
-        return Camera(view.eye, view.target)
+        return Camera(view.eye, view.target, scene.up)
     camera = Camera.framing(
         scene.domain.lower,
         scene.domain.upper,
         azimuth=view.azimuth if options.azimuth is None else options.azimuth,
         elevation=view.elevation if options.elevation is None else options.elevation,
         aspect=width / height,
+        up=scene.up,
     )
     return camera.zoomed(1.0 / view.zoom) if view.zoom != 1.0 else camera
 
@@ -152,45 +192,8 @@ class Painter:
 
     def label(self, image: np.ndarray, now: Reading) -> np.ndarray:
         """Return a picture, (height, width, 3 or 4), with time, number of particles, legend and the bar of its colours."""
-        mode = self.options.colour_by
+        mode, palette = self.options.colour_by, self.options.palette
         lines = [f"t = {now.time:.3f} s", f"Δt_b = {milliseconds(now.base_step)} ms", f"{now.count:,} particles"]
-        image = legend.draw_legend(image, self.title, self.entries(now), lines)
-        if mode not in BARS:
-            return image
-        title, unit, factor = BARS[mode]
-        scale = self.tints.scale(now, self.options.palette)
-        lower, upper = scale.ends(mode)
-        tints = colours.colour_by(mode, np.linspace(lower, upper, BAR_STEPS), scale)
-        upper = upper if upper > colours.LEAST_TOP else 0.0
-        return legend.draw_colour_bar(image, title, factor * lower, factor * upper, unit, tints)
-
-    def entries(self, now: Reading) -> list[tuple[str, Any, float]]:
-        """One entry a colour of levels or fluids, with the share of particles that have it now; none in other modes."""
-        palette = self.options.palette
-        if self.options.colour_by == "fluid":
-            tints = colours.fluid_colours(self.scene.fluid_colours, palette)
-            counts = np.bincount(now.fluids, minlength=len(tints)) / max(1, now.count)
-            return [
-                (name, tuple(t), share) for name, t, share in zip(self.scene.fluid_names, tints, counts, strict=True)
-            ]
-        if self.options.colour_by != "level":
-            return []
-        classes = level_classes(now.level_shares, now.levels_double)
-        if now.levels_double and len(classes) > LEGEND_ROWS:
-            classes = [each for each in classes if each.share > 0.0]
-        tints = colours.level_colours([each.first for each in classes], palette, doubling=now.levels_double)
-        return [
-            (f"level {each}: {each} Δt_b" if each.last > 1 else "level 1: Δt_b", tuple(tint), each.share)
-            for each, tint in zip(classes, tints, strict=True)
-        ]
-
-
-BARS: dict[str, tuple[str, str, float]] = {
-    "step": ("step", "ms", 1e3),
-    "lead": ("ahead of the youngest", "ms", 1e3),
-    "speed": ("speed", "m/s", 1.0),
-    "density": ("density", "kg/m^3", 1.0),
-    "sound": ("sound speed", "m/s", 1.0),
-    "pressure": ("pressure", "kPa", 1e-3),
-}
-"""Modes that have a bar of colours: its title, its unit, and how many of them the SI unit is."""
+        image = legend.draw_legend(image, self.title, self.tints.entries(now, mode, palette), lines)
+        bar = self.tints.bar(now, mode, palette)
+        return legend.draw_colour_bar(image, *bar) if bar else image

@@ -43,7 +43,7 @@ class Sample:
 def sample(scene: Scene) -> Sample:
     """Fill the scene's fluids with a lattice, but not where obstacles are, and line its walls and obstacles."""
     solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
-    positions = [keep_outside(scene, solids, fluid.fill(scene.spacing, scene.domain)) for fluid in scene.fluids]
+    positions = fluid_positions(scene, solids)
     moving = [fluid.velocities_at(x) for fluid, x in zip(scene.fluids, positions, strict=True)]
     pressed = [compress(scene, fluid, x) for fluid, x in zip(scene.fluids, positions, strict=True)]
     viscosities = [np.full(len(x), nu) for x, nu in zip(positions, scene.viscosities, strict=False)]
@@ -57,6 +57,13 @@ def sample(scene: Scene) -> Sample:
         *line_walls(scene),
         line_obstacles(scene, solids),
     )
+
+
+def fluid_positions(scene: Scene, solids: Sequence[Solid] | None = None) -> list[np.ndarray]:
+    """Positions [m], (N, dim) each, of the lattice of every fluid; `solids` are those of the scene's obstacles."""
+    if solids is None:
+        solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
+    return [keep_outside(scene, solids, fluid.fill(scene.spacing, scene.domain)) for fluid in scene.fluids]
 
 
 def compress(scene: Scene, fluid: FluidShape, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

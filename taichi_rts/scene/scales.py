@@ -50,6 +50,19 @@ class SceneScales(SceneFields):
         return GravityTable(times, values, self.gravity_interpolation == "linear")
 
     @property
+    def up(self) -> tuple[float, float, float]:
+        """Unit vector, (3,), against gravity, or the first change of it that is not 0; y without gravity.
+
+        A component along a periodic axis drives a flow and is no weight: it does not count.
+        """
+        for gravity in (self.acceleration, *(change.gravity for change in self.gravity_changes)):
+            against = [0.0 if repeats else 0.0 - g for g, repeats in zip(gravity, self.is_periodic, strict=True)]
+            if length := math.hypot(*against):
+                x, y, z = (g / length for g in (*against, 0.0)[:3])
+                return x, y, z
+        return 0.0, 1.0, 0.0
+
+    @property
     def viscosities(self) -> tuple[float, ...]:
         """Kinematic viscosity [m^2/s] of each fluid, (len(fluids),), and of what flows in, if anything does."""
         own = (fluid.kinematic_viscosity for fluid in self.fluids)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Callable, Iterator, Sequence
 from typing import Annotated, Any, Union
 
@@ -29,8 +30,25 @@ def one_of(kinds: Sequence[type], kind_of: Callable[[Any], type | None], **unkno
 
 @functools.cache
 def schema_of(kind: type) -> dict[str, Any]:
-    """Return the JSON Schema of a pydantic dataclass."""
-    return {"$schema": DIALECT, **pydantic.TypeAdapter(kind).json_schema()}
+    """Return the JSON Schema of a pydantic dataclass; keys are described by `Attributes` of the docstrings."""
+    schema = pydantic.TypeAdapter(kind).json_schema()
+    for part in (schema, *schema.get("$defs", {}).values()):
+        _describe(part)
+    return {"$schema": DIALECT, **schema}
+
+
+def _describe(part: dict[str, Any]) -> None:
+    """Move what the description of an object, a docstring, says of its keys to those."""
+    about, found, rest = part.get("description", "").partition("\nAttributes:\n")
+    if not found:
+        return
+    section, _, after = rest.partition("\n\n")
+    part["description"] = "\n\n".join(text.strip() for text in (about, after) if text.strip())
+    for entry in re.split(r"\n(?= {4}\S)", "\n" + section)[1:]:
+        names, _, text = entry.strip().partition(": ")
+        for name in names.split(", "):
+            if name in part["properties"]:
+                part["properties"][name]["description"] = " ".join(text.split())
 
 
 def keys_at(kind: type, place: Sequence[str | int]) -> list[str]:

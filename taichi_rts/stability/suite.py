@@ -62,7 +62,7 @@ def _setting(kind: Any, setup: Setup) -> Setting:
 
 
 SETTINGS: tuple[Setting, ...] = tuple(_setting(kind, setup) for kind, setup in setups("mapped").values())
-"""All steppers, in the order of the map's columns; those that end in "_c" run with the regional sound speed."""
+"""All steppers, in the order of the map's columns; those that end in "-c" run with the regional sound speed."""
 
 
 @dataclasses.dataclass(frozen=True)

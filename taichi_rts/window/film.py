@@ -11,6 +11,7 @@ from taichi_rts.files.writing import write_png
 from taichi_rts.rendering import legend
 from taichi_rts.rendering.camera import Camera
 from taichi_rts.rendering.splatter import Splatter
+from taichi_rts.rendering.tints import ColourBar, Entry
 
 FPS = 30.0
 
@@ -46,10 +47,14 @@ class Film:
             ) from None
         return cls(folder, width, height)
 
-    def add(self, view: Any, camera: Camera, outline: Any, entries: list[Any], lines: list[str]) -> None:
-        """Write the next picture; raises `OutputError`."""
+    def add(
+        self, view: Any, camera: Camera, outline: Any, entries: list[Entry], bar: ColourBar | None, lines: list[str]
+    ) -> None:
+        """Write the next picture, with the legend of its colours: `entries` or a `bar`; raises `OutputError`."""
         image = self.renderer.draw(view.positions, view.colours, view.radius, camera, outline)
         image = legend.draw_legend(image, "", entries, lines)
+        if bar is not None:
+            image = legend.draw_colour_bar(image, *bar)
         write_png(self.folder / f"{self.count:06d}.png", image)
         if self.video:
             self.video.append(image)

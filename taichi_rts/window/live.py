@@ -27,6 +27,11 @@ MESSAGE_LINES, MESSAGE_WIDTH = 5, 38  # room for messages [rows, letters]
 LINE = 18.0  # height of a row of ImGui's [pixels], whose text has one size in windows of any size
 SLIDER = 23.0
 PLOT_WIDTH, PLOT_HEIGHT, PLOT_EDGE = 260.0, 80.0, 12.0  # of the plot of level shares [pixels]
+BAR_BOTTOM, BAR_HEIGHT, BAR_TEXT = (
+    108.0,
+    16.0,
+    56.0,
+)  # of the bar of colours above it, and of the panel with its numbers
 BACKGROUND = (0.85, 0.86, 0.88)
 KEY_LINES = (
     "Space   pause, go on",
@@ -66,11 +71,11 @@ def watch(
         for key in window.pressed():
             session.press(key)
         session.advance()
-        view, entries, lines = session.view(), session.entries(), session.lines()
+        view, entries, lines = session.view(), [*session.entries(), *session.fluid_entries()], session.lines()
         panel = Panel(session, entries, lines, options.width, options.height)
         window.panel = (panel.width, panel.height)
-        window.draw(*view, camera, outline, panel, share_plot(session, options.width, options.height))
-        session.capture((window.camera or camera).panned(aside, 0.0), outline, entries, lines)
+        window.draw(*view, camera, outline, panel, overlay(session, options.width, options.height))
+        session.capture((window.camera or camera).panned(aside, 0.0), outline, lines)
     session.close()
     window.close()
     return session.sim
@@ -113,11 +118,38 @@ class Panel:
             panel.text("lower right: shares over time")
             for line in _wrapped(session.message):
                 panel.text(line)
+        if bar := session.bar():
+            width, height = self._shares(PLOT_WIDTH, BAR_TEXT)
+            top = 1.0 - (BAR_BOTTOM + BAR_HEIGHT + BAR_TEXT + 4.0) / self.size[1]
+            left = 1.0 - (PLOT_WIDTH + PLOT_EDGE) / self.size[0]
+            with gui.sub_window("colours", max(left, 0.0), max(top, 0.0), width, height) as text:
+                text.text(f"{bar.title} [{bar.unit}]")
+                middle = 0.5 * (bar.lower + bar.upper)
+                text.text(f"{bar.lower:<12.4g}{middle:^12.4g}{bar.upper:>11.4g}")
         if session.helps:
             width, height = self._shares(KEYS_WIDTH, LINE * len(KEY_LINES) + 40.0)
             with gui.sub_window("keys", 0.99 - width, 0.01, width, height) as keys:
                 for line in KEY_LINES:
                     keys.text(line)
+
+
+def overlay(session: LiveSession, columns: int, rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the triangles of what lies over the picture: the plot of shares, and a bar of colours where the mode has one."""
+    parts = [share_plot(session, columns, rows)]
+    if bar := session.bar():
+        parts.append(bar_plot(bar.colours, columns, rows))
+    corners, shades = zip(*parts, strict=True)
+    return np.concatenate(corners), np.concatenate(shades)
+
+
+def bar_plot(tints: np.ndarray, columns: int, rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the triangles of a bar of colours, (K, 3), above the plot of shares; as `share_plot`."""
+    scale, count = np.array([columns, rows], float), len(tints)
+    start = np.array([columns - PLOT_WIDTH - PLOT_EDGE, BAR_BOTTOM])
+    left = start + np.stack([PLOT_WIDTH / count * np.arange(count), np.zeros(count)], axis=1)
+    return _boxes(left / scale, (left + np.array([PLOT_WIDTH / count, BAR_HEIGHT])) / scale), np.repeat(
+        tints, 6, axis=0
+    )
 
 
 def share_plot(session: LiveSession, columns: int, rows: int) -> tuple[np.ndarray, np.ndarray]:

@@ -19,7 +19,7 @@ from taichi_rts.readings.levels import level_classes, milliseconds
 from taichi_rts.rendering import colours
 from taichi_rts.rendering.obstacles import ObstaclePoints
 from taichi_rts.rendering.painter import PictureOptions, make_cameras
-from taichi_rts.rendering.tints import Tints
+from taichi_rts.rendering.tints import ColourBar, Entry, Tints
 from taichi_rts.scene.parts.conditions import AXES
 from taichi_rts.scene.placing import at_origin
 from taichi_rts.scene.scene import Scene
@@ -290,12 +290,13 @@ class LiveSession:
         else:
             self.message, self.film = self.film.close(), None
 
-    def capture(self, camera: Any, outline: Any, entries: list[Any], lines: list[str]) -> None:
+    def capture(self, camera: Any, outline: Any, lines: list[str]) -> None:
         """Add the present picture to the recording, if there is one and time has passed since its last."""
         if self.film is not None and self.sim.time != self.film.time:
             film = self.film
             film.time = self.sim.time
-            self._guard(lambda: film.add(self.view(), camera, outline, entries, lines))
+            entries = self.entries() if self.mode == "level" else self.fluid_entries()
+            self._guard(lambda: film.add(self.view(), camera, outline, entries, self.bar(), lines))
 
     def help(self) -> None:
         """Show or hide the list of keys."""
@@ -349,11 +350,21 @@ class LiveSession:
             x, tints = x[kept], tints[kept]
         return Spheres(x, tints, radius)
 
-    def entries(self) -> list[tuple[str, Any, float]]:
+    def entries(self) -> list[Entry]:
         """Return text, colour and share of each class of levels, as legends have them."""
         doubling, classes = self.sim.schedule.levels_double, self.classes()
         tints = colours.level_colours([each.first for each in classes], self.options.palette, doubling=doubling)
         return [(f"level {each}", tuple(tint), each.share) for each, tint in zip(classes, tints, strict=True)]
+
+    def fluid_entries(self) -> list[Entry]:
+        """Return the same of each fluid, if colours show that."""
+        if self.mode != "fluid":
+            return []
+        return self.tints.entries(self.sim.read(), self.mode, self.options.palette)
+
+    def bar(self) -> ColourBar | None:
+        """Return the bar of the colours that are shown, if they have one."""
+        return self.tints.bar(self.sim.read(), self.mode, self.options.palette)
 
     def lines(self) -> list[str]:
         """Return the live numbers."""

@@ -1,24 +1,38 @@
 """The example scene files, each coarser and for a few steps, and what they and the schema have to agree on."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import taichi_rts as rts
+from taichi_rts.commands.scene_copies import EXAMPLES, copy_scene, example_names
 from taichi_rts.scene.files.reading import read_scene_file, tomllib
 from taichi_rts.scene.loading import scene_from
 from taichi_rts.scene.obstacles.shapes import BY_NAME
 from taichi_rts.scene.schema import keys_at
 
-FOLDER = Path(__file__).parents[2] / "demos" / "scenes"
+FOLDER = EXAMPLES
 FILES = sorted(FOLDER.glob("*.toml"))
 COARSE = {"two_dams": 0.1, "inflow_jet": 0.05, "wave_paddle": 0.05, "splash_regional": 0.1}
 
 
 def test_there_are_five():
-    assert len(FILES) == 5
+    assert len(FILES) == len(example_names()) == 5
+
+
+def test_a_copy_loads_and_replaces_nothing(tmp_path):
+    files = copy_scene("two_dams", tmp_path)
+    assert [path.name for path in files] == ["two_dams.toml", "hexagon.obj"]
+    assert rts.load_scene(files[0]).obstacles[0].sha256 == rts.load_scene(FOLDER / "two_dams.toml").obstacles[0].sha256
+    files[0].unlink()
+    files[1].write_text("mine")
+    with pytest.raises(rts.OutputError, match=r"hexagon.obj is there already, and --copy replaces nothing"):
+        copy_scene("two_dams", tmp_path)
+    assert (files[1].read_text(), files[0].exists()) == ("mine", False)
+    assert rts.load_scene(*copy_scene("dam_break_2d.toml", tmp_path)) == rts.load_scene("dam_break_2d")
+    with pytest.raises(rts.SceneError, match="'two_dam' is no scene of this package; did you mean 'two_dams'"):
+        copy_scene("two_dam", tmp_path)
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

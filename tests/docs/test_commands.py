@@ -12,6 +12,7 @@ from checking import as_text, check
 from documents import PAGES, ROOT, anchors, blocks, commands, links, name, scene_files
 
 import taichi_rts as rts
+from taichi_rts.commands.scene_copies import EXAMPLES
 from taichi_rts.errors import Error
 from taichi_rts.scene.files.reading import tomllib, with_files_beside
 from taichi_rts.scene.loading import scene_from
@@ -31,6 +32,7 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("docs")
     for part in ("assets", "demos"):
         (folder / part).symlink_to(ROOT / part)
+    shutil.copytree(EXAMPLES, folder, dirs_exist_ok=True)  # as if they had been copied
     (folder / "out/tank/particles").mkdir(parents=True)
     frame = rts.ParticleFrame(np.array([[0.2, 0.2], [0.4, 0.2]]), {}, 0.0, 0.02)
     rts.write_particles(folder / "out/tank/particles/000012.npz", frame)

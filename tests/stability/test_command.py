@@ -43,20 +43,29 @@ def call(tmp_path, monkeypatch, taichi):
 
     def start(*args):
         calls.clear()
-        main(["stability", "--steppers", "serna", "--output-dir", str(folder), *args])
+        main(["stability", "--steppers", "uniform", "--output-dir", str(folder), *args])
         return folder, list(calls)
 
     return start
 
 
+def test_former_names_of_steppers_are_taken():
+    assert [command.FORMER[name] for name in ("serna", "regional_paper", "adaptive_c")] == [
+        "uniform",
+        "paper",
+        "uniform-c",
+    ]
+    assert set(command.FORMER.values()) < {setting.name for setting in suite.SETTINGS}
+
+
 def test_a_map_is_written_and_resumed(call, capsys, monkeypatch):
     folder, calls = call("--tolerance", "1")
-    assert calls == [("tiny_pool", "serna")]
+    assert calls == [("tiny_pool", "uniform")]
     out = capsys.readouterr().out
     assert "≥0.80" in out
     data = json.loads((folder / "stability.json").read_text())
     cell = data["cells"][0]
-    assert (cell["case"], cell["setting"], cell["stable"], cell["unstable"]) == ("tiny_pool", "serna", 0.8, None)
+    assert (cell["case"], cell["setting"], cell["stable"], cell["unstable"]) == ("tiny_pool", "uniform", 0.8, None)
     assert cell["runs"] == [0.4, 0.8]
     assert cell["longest"] == pytest.approx(0.8)
     assert cell["outcome"]["survived"]
@@ -68,10 +77,10 @@ def test_a_map_is_written_and_resumed(call, capsys, monkeypatch):
     outcome = suite.Cell.load(cell).outcome
     monkeypatch.setattr(suite, "watch", lambda *args, **options: outcome)
     assert call("--tolerance", "1", "--resume") == (folder, [])
-    (folder / "cells" / "tiny_pool--serna.json").write_text("{")  # as after a stop in the middle of another program
-    assert call("--tolerance", "1", "--resume", "--no-plot")[1] == [("tiny_pool", "serna")]
+    (folder / "cells" / "tiny_pool--uniform.json").write_text("{")  # as after a stop in the middle of another program
+    assert call("--tolerance", "1", "--resume", "--no-plot")[1] == [("tiny_pool", "uniform")]
     (folder / "notes.txt").write_text("mine")
-    assert call("--tolerance", "1", "--overwrite", "--no-plot")[1] == [("tiny_pool", "serna")]
+    assert call("--tolerance", "1", "--overwrite", "--no-plot")[1] == [("tiny_pool", "uniform")]
     assert not (folder / "stability.png").exists()
     assert (folder / "notes.txt").exists()
 
@@ -86,7 +95,7 @@ def test_quick_says_which_default_fails(call, capsys, monkeypatch):
     assert stop.value.code == 1
     out = " ".join(capsys.readouterr().out.split())
     assert "FAIL" in out
-    assert "default fails fist with serna at 0.4: " in out
+    assert "default fails fist with uniform at 0.4: " in out
     assert not json.loads((folder / "stability.json").read_text())["cells"][0]["outcome"]["survived"]
 
 

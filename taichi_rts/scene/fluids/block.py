@@ -18,10 +18,13 @@ from taichi_rts.scene.validation import FROZEN, Colour, NotNegative, Vector, val
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class Block(FluidShape):
-    """A block of fluid between two corners `lower` and `upper` [m], (dim,).
+    """A block of fluid between two corners.
 
-    It moves at `velocity` [m/s]: a vector (dim,) or a field of `velocities.py`; None: at rest. `kinematic_viscosity` is
-    its nu [m^2/s]; None: the scene's. `colour` is its colour in pictures by fluid, "orange" or "#RRGGBB"; None: the palette's.
+    Attributes:
+        lower, upper: the corners [m], (dim,).
+        velocity: [m/s] at the start: a vector (dim,) or a field of `velocities.py`; None: at rest.
+        kinematic_viscosity: nu [m^2/s]; None: the scene's.
+        colour: in pictures by fluid, "orange" or "#RRGGBB"; None: the palette's.
     """
 
     lower: Vector

@@ -19,10 +19,14 @@ from taichi_rts.scene.validation import FROZEN, Colour, NotNegative, Positive, V
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class Sphere(FluidShape):
-    """A sphere of fluid, in two dimensions a disc, around `centre` [m], (dim,), with `radius` [m].
+    """A sphere of fluid, in two dimensions a disc.
 
-    It moves at `velocity` [m/s]: a vector (dim,) or a field of `velocities.py`; None: at rest. `kinematic_viscosity` is
-    its nu [m^2/s]; None: the scene's. `colour` is its colour in pictures by fluid, "orange" or "#RRGGBB"; None: the palette's.
+    Attributes:
+        centre: [m], (dim,).
+        radius: [m].
+        velocity: [m/s] at the start: a vector (dim,) or a field of `velocities.py`; None: at rest.
+        kinematic_viscosity: nu [m^2/s]; None: the scene's.
+        colour: in pictures by fluid, "orange" or "#RRGGBB"; None: the palette's.
     """
 
     centre: Vector

@@ -20,9 +20,15 @@ from taichi_rts.scene.validation import FROZEN, Vector, validated
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class BoxObstacle(ObstacleShape):
-    """A box between two corners `lower` and `upper` [m], (dim,), turned by `rotation` [degrees] about its middle.
+    """A box between two corners.
 
-    `motion` says how it moves, None: not at all; in a scene file its `shape` is "box". Raises `SceneError`.
+    Attributes:
+        lower, upper: the corners [m], (dim,).
+        rotation: [degrees] about its middle: one number in two dimensions, counter-clockwise, in three a vector along the axis.
+        motion: how it moves; None: not at all.
+        shape: "box", as a scene file has it.
+
+    Raises `SceneError`.
     """
 
     lower: Vector

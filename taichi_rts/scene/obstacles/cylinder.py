@@ -20,9 +20,15 @@ from taichi_rts.scene.validation import FROZEN, Number, Positive, validated
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class CylinderObstacle(ObstacleShape):
-    """A round cylinder with `radius` [m] whose axis goes from `start` to `end` [m], (3,).
+    """A round cylinder, in three dimensions.
 
-    `motion` says how it moves, None: not at all; in a scene file its `shape` is "cylinder". Raises `SceneError`.
+    Attributes:
+        start, end: ends of its axis [m], (3,).
+        radius: [m].
+        motion: how it moves; None: not at all.
+        shape: "cylinder", as a scene file has it.
+
+    Raises `SceneError`.
     """
 
     start: Annotated[tuple[Number, ...], Len(3, 3)]

@@ -41,11 +41,15 @@ class Pieces(NamedTuple):
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class ConstantMotion:
-    """A body that moves at `velocity` [m/s], (dim,), and turns about its pivot at `angular_velocity` [rad/s].
+    """A body that moves at constant velocities.
 
-    From `start` [s] to `stop` [s], None: for ever. In two dimensions `angular_velocity` is one number, counter-clockwise,
-    in three a vector along the axis. `pivot` [m], (dim,), is where the pivot is at the start and moves on with the body; None:
-    the middle of its bounding box.
+    Attributes:
+        velocity: [m/s], (dim,); None: 0.
+        angular_velocity: [rad/s] about the pivot: one number in two dimensions, counter-clockwise, in three a vector along the
+            axis; None: 0.
+        pivot: [m], (dim,), where the pivot is at the start; it moves on with the body. None: the middle of its bounding box.
+        start: [s], from which on it moves.
+        stop: [s], until which it moves; None: for ever.
     """
 
     velocity: Vector | None = None

@@ -20,9 +20,14 @@ from taichi_rts.scene.validation import FROZEN, Number, validated
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class PolygonObstacle(ObstacleShape):
-    """A polygon in two dimensions with corners `points` [m], (K, 2), in either direction, whose edges do not cross.
+    """A polygon in two dimensions.
 
-    `motion` says how it moves, None: not at all; in a scene file its `shape` is "polygon". Raises `SceneError`.
+    Attributes:
+        points: its corners [m], (K, 2), in either direction; edges do not cross.
+        motion: how it moves; None: not at all.
+        shape: "polygon", as a scene file has it.
+
+    Raises `SceneError`.
     """
 
     points: Annotated[tuple[Annotated[tuple[Number, ...], Len(2, 2)], ...], Len(3)]

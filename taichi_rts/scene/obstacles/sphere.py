@@ -18,9 +18,15 @@ from taichi_rts.scene.validation import FROZEN, Positive, Vector, validated
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class SphereObstacle(ObstacleShape):
-    """A sphere, in two dimensions a disc, around `centre` [m], (dim,), with `radius` [m].
+    """A sphere, in two dimensions a disc.
 
-    `motion` says how it moves, None: not at all; in a scene file its `shape` is "sphere". Raises `SceneError`.
+    Attributes:
+        centre: [m], (dim,).
+        radius: [m].
+        motion: how it moves; None: not at all.
+        shape: "sphere", as a scene file has it.
+
+    Raises `SceneError`.
     """
 
     centre: Vector

@@ -17,7 +17,11 @@ CORNERS = ("lower", "upper")
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class Box:
-    """An axis-aligned box between two corners: `lower` and `upper` [m], (dim,) each."""
+    """An axis-aligned box.
+
+    Attributes:
+        lower, upper: two opposite corners [m], (dim,).
+    """
 
     lower: Vector
     upper: Vector

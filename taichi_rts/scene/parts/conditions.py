@@ -31,7 +31,12 @@ def face_position(face: str, domain: Box) -> float:
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class GravityChange:
-    """From `time` [s] on gravity is `gravity` [m/s^2], (dim,)."""
+    """Gravity is another from some time on.
+
+    Attributes:
+        time: [s], from which on.
+        gravity: [m/s^2], (dim,).
+    """
 
     time: Positive
     gravity: Vector
@@ -91,10 +96,13 @@ class MovingWall:
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class Inflow:
-    """A patch of a face of the domain, flat box from `lower` to `upper` [m], (dim,), through which fluid flows in.
+    """A patch of a face of the domain through which fluid flows in, as a lattice.
 
-    It enters as a lattice at `velocity` [m/s], (dim,), and keeps that velocity for one support radius; from `start` [s] to
-    `stop` [s], None: the scene's end.
+    Attributes:
+        lower, upper: corners of the patch [m], (dim,), equal in the component across the face.
+        velocity: [m/s], (dim,), which the fluid keeps for one support radius.
+        start: [s], from which on it flows.
+        stop: [s], until which it flows; None: the scene's end.
     """
 
     lower: Vector
@@ -144,9 +152,12 @@ class Inflow:
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class Outlet:
-    """A sink: a box from `lower` to `upper` [m], (dim,), in which fluid is taken out of the run.
+    """A sink: a box in which fluid is taken out of the run.
 
     It leaves freely: what is still outside sees no fluid in there, so the pressure at the box's faces is 0.
+
+    Attributes:
+        lower, upper: two opposite corners of the box [m], (dim,).
     """
 
     lower: Vector

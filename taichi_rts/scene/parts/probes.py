@@ -18,7 +18,12 @@ Name = Annotated[str, StringConstraints(pattern=r"^[\w.+-]+$")]
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class Probe:
-    """A point `position` [m], (dim,), where pressure is measured; `name` heads its column, None: its number from 1."""
+    """A point where pressure is measured.
+
+    Attributes:
+        position: [m], (dim,).
+        name: heads its column of the time series; None: its number from 1.
+    """
 
     position: Vector
     name: Name | None = None
@@ -28,9 +33,11 @@ class Probe:
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class Gauge:
-    """A line along gravity's main axis through `position` [m], (dim,), on which the water's height is measured.
+    """A line along gravity's main axis on which the water's height is measured.
 
-    `name` heads its column, None: its number from 1.
+    Attributes:
+        position: any point of it [m], (dim,).
+        name: heads its column of the time series; None: its number from 1.
     """
 
     position: Vector

@@ -14,9 +14,13 @@ from taichi_rts.scene.validation import FROZEN, Number, Positive, Vector, valida
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class View:
-    """Where pictures are taken from: `azimuth` and `elevation` [degrees] around the domain, or `eye` and `target` [m], (3,).
+    """Where pictures are taken from: angles around the domain, or `eye` and `target`. Raises `SceneError`.
 
-    `zoom` enlarges what is seen from there. Raises `SceneError`.
+    Attributes:
+        azimuth: [degrees] around the vertical, which is against gravity; at 0 the x axis runs to the right (y or z if x is up).
+        elevation: [degrees] above the ground.
+        eye, target: where the camera is and what it looks at [m], (3,), instead of the angles; None: by the angles.
+        zoom: how much larger than the whole domain would be.
     """
 
     azimuth: Number = -35.0

@@ -65,8 +65,8 @@ class Asynchronous(Stepper):
     compared: ClassVar[tuple[Setup, ...]] = (Setup("asynchronous"), Setup("asynchronous-c", regional_sound=True))
     mapped: ClassVar[tuple[Setup, ...]] = (
         Setup("asynchronous"),
-        Setup("asynchronous_integers", {"steps": "integers"}),
-        Setup("asynchronous_c", regional_sound=True),
+        Setup("asynchronous-integers", {"steps": "integers"}, former=("asynchronous_integers",)),
+        Setup("asynchronous-c", regional_sound=True, former=("asynchronous_c",)),
     )
 
     @property

@@ -34,6 +34,7 @@ class Setup:
         courant: its default; None: `own_courant` with these parameters.
         regional_sound: whether it runs with the regional sound speed.
         of_longest: whether a comparison's courant is that of the longest step, else the parameter `courant` as it is.
+        former: names that it had before, which the command line still takes.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Setup:
     courant: float | None = None
     regional_sound: bool = False
     of_longest: bool = True
+    former: tuple[str, ...] = ()
 
 
 class Stepper:

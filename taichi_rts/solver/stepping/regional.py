@@ -124,10 +124,10 @@ class Regional(Stepper):
     )
     mapped: ClassVar[tuple[Setup, ...]] = (
         Setup("regional"),
-        Setup("regional_2", {"levels": 2, **PAPERS}, 0.2),
-        Setup("regional_3", {"levels": 3, **PAPERS}, 0.4 / 3),
-        Setup("regional_paper", {"preset": "paper"}),
-        Setup("regional_c", courant=REGIONAL_SOUND["courant"], regional_sound=True),
+        Setup("regional-2", {"levels": 2, **PAPERS}, 0.2, former=("regional_2",)),
+        Setup("regional-3", {"levels": 3, **PAPERS}, 0.4 / 3, former=("regional_3",)),
+        Setup("paper", {"preset": "paper"}, former=("regional_paper",)),
+        Setup("regional-c", courant=REGIONAL_SOUND["courant"], regional_sound=True, former=("regional_c",)),
     )
 
     def resolved(self, key: str) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
@@ -45,6 +46,28 @@ def require_kind(kind: Any) -> None:
         raise StepperError(f"{kind.__name__} has no name; give it a class attribute, name = 'own'")
     if name in PACKAGES_OWN and kind is not STEPPERS[name]:
         raise StepperError(f"{kind.__name__} has the name {name!r} of {STEPPERS[name].__name__}; give it another one")
+
+
+def as_stepper(stepper: Stepper | str | None) -> Stepper:
+    """Return the stepper that is meant: itself, by its name one with its defaults, or `Regional()` for None.
+
+    Raises `StepperError` for anything else, and for a name that no stepper has.
+    """
+    if stepper is None:
+        return Regional()
+    if isinstance(stepper, str):
+        if stepper not in STEPPERS:
+            near = difflib.get_close_matches(stepper, STEPPERS, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise StepperError(f"stepper {stepper!r} is none of {', '.join(STEPPERS)}{hint}")
+        stepper = STEPPERS[stepper]()
+    if isinstance(stepper, type):
+        raise StepperError(f"stepper {stepper.__name__} is a class; give an object of it, {stepper.__name__}()")
+    if not callable(getattr(stepper, "schedule", None)):
+        raise StepperError(
+            f"stepper {stepper!r} is none; give e.g. rts.Regional(), or one of {', '.join(STEPPERS)} by name"
+        )
+    return stepper  # type: ignore[return-value]  # any object that has a schedule, as comparisons and tests have
 
 
 def setups(what: str) -> dict[str, tuple[Any, Setup]]:

@@ -47,10 +47,10 @@ class Uniform(Stepper):
         Setup("uniform-c", {"adaptive": True}, regional_sound=True),
     )
     mapped: ClassVar[tuple[Setup, ...]] = (
-        Setup("serna"),
-        Setup("euler", {"integrator": "symplectic_euler"}),
-        Setup("adaptive", {"adaptive": True}),
-        Setup("adaptive_c", {"adaptive": True}, regional_sound=True),
+        Setup("uniform", former=("serna",)),
+        Setup("uniform-euler", {"integrator": "symplectic_euler"}, former=("euler",)),
+        Setup("uniform-adaptive", {"adaptive": True}, former=("adaptive",)),
+        Setup("uniform-c", {"adaptive": True}, regional_sound=True, former=("adaptive_c",)),
     )
 
     @property

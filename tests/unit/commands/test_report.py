@@ -8,6 +8,7 @@ from taichi_rts.assembly.work import speedup_bound
 from taichi_rts.commands import report
 from taichi_rts.medium.energy import Energy
 from taichi_rts.readings.diagnosis import Diagnosis
+from taichi_rts.sampling.sampling import sample
 
 STATISTICS = {
     "base_steps": 100,
@@ -69,6 +70,11 @@ def test_table_shows_what_passes_cost(capsys, monkeypatch):
     report.print_table(sim, Energy(1.0, 2.0, 1.0))
     words = " ".join(capsys.readouterr().out.split())
     for fact in (
+        "level ┃ step [ms] ┃ share",
+        "particles 100, spacing 0.025 m",
+        "sound speed 10 m/s",
+        "overhead (ε) 10.0% of a full step: work for all particles, due or not",
+        "stopped by the domain 0 times a particle, at a face",
         "updates saved 75.0% over uniform steps of the base step",
         "passes 50 in 13 cycles",
         "cells in a pass 1 to 1,234, median 7",
@@ -124,3 +130,13 @@ def test_where_nothing_moves_at_the_start_a_change_of_energy_is_no_share_of_it(c
     assert "energy gained 250.00% of 1 J at the start; use a smaller --courant" in " ".join(
         capsys.readouterr().out.split()
     )
+
+
+def test_the_list_of_scenes_counts_what_a_run_has(capsys, monkeypatch):
+    monkeypatch.setattr(report, "console", Console(width=160))
+    scenes = [rts.load_scene(name) for name in ("double_dam_break", "torricelli")]
+    report.print_scenes(scenes)
+    out = capsys.readouterr().out
+    assert "end [s]" in out
+    for scene, count in zip(scenes, (34_320, len(sample(scenes[1]).positions)), strict=True):
+        assert f"{count:,}" in next(line for line in out.splitlines() if f" {scene.name} " in line)

@@ -85,3 +85,12 @@ def test_views_without_perspective_are_to_scale(angles, across, upward):
     assert flat[:, :2].min() >= 0
     assert (flat[:, :2].max(axis=0) <= (800, 400)).all()
     assert (flat[:, 2] > 0).all()
+
+
+def test_a_flat_box_is_framed_with_its_own_up():
+    camera = Camera.framing((0, 0), (2, 3), aspect=1.5, up=(1.0, 0.0, 0.0))
+    corners = camera.project(box_corners((0, 0), (2, 3)), 300, 200)
+    assert np.all((corners[:, :2] > 0) & (corners[:, :2] < [300, 200]))
+    low, high = corners[0], corners[1]  # (0, 0) and (2, 0)
+    assert low[0] == pytest.approx(high[0])
+    assert low[1] - high[1] == pytest.approx(0.93 * 200)  # x is upward, and fills the height

@@ -1,4 +1,5 @@
 from types import SimpleNamespace
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -7,9 +8,9 @@ import taichi_rts as rts
 from taichi_rts.medium.medium import Medium
 from taichi_rts.readings.levels import level_classes, milliseconds
 from taichi_rts.readings.reading import Moment, Reading
-from taichi_rts.rendering import legend
+from taichi_rts.rendering import legend, lighting
 from taichi_rts.rendering.colours import level_colours, scalar_colours
-from taichi_rts.rendering.painter import Painter, PictureOptions, make_cameras
+from taichi_rts.rendering.painter import Painter, PictureChoices, PictureOptions, make_cameras, picture_options
 from taichi_rts.rendering.tints import Tints
 
 SCENE = rts.load_scene("dam_break_2d")
@@ -48,7 +49,7 @@ def reading(level, count=1, *, doubling=False, density=None, scene=SCENE, tick=0
 
 
 def entries(now):
-    return Painter(SCENE, PictureOptions(), renderer=NOTHING).entries(now)
+    return Tints(SCENE).entries(now, "level", "default")
 
 
 def test_regional_levels_have_an_entry_each():
@@ -170,3 +171,45 @@ def test_pressure_is_coloured_up_to_that_of_the_largest_speed():
     rho = law.density(tints.top_pressure * np.array([0, 0.25, 0.5, 2]))
     got = tints.of(reading([1, 1, 1, 1], density=rho), "pressure", "default")
     assert np.allclose(got, scalar_colours([0, 0.25, 0.5, 1], 0, 1), atol=0.01)
+
+
+@pytest.mark.parametrize("view", [{}, {"eye": (9, -9, 5), "target": (0, 0, 0)}])
+def test_every_view_of_a_scene_with_z_up_has_z_up(view):
+    scene = rts.load_scene("dam_break", gravity=(0, 0, -9.81), view=rts.View(**view))
+    for camera in make_cameras(scene, PictureOptions(views=("scene", "front", "side"))):
+        low, high = camera.project([[0.1, 0.1, 0.1], [0.1, 0.1, 0.2]], 320, 180)
+        assert abs(low[0] - high[0]) < 2.0
+        assert low[1] > high[1] + 1.0  # pixels count downward
+    top = make_cameras(scene, PictureOptions(views=("top",)))[0]
+    left, right = top.project([[0.1, 0.1, 0.1], [0.2, 0.1, 0.1]], 320, 180)
+    assert right[0] > left[0] + 5.0
+
+
+def test_floor_and_ground_lie_across_gravity():
+    scene = rts.load_scene("dam_break", gravity=(0, 0, -9.81))
+    camera = make_cameras(scene, PictureOptions())[0]
+    basis, box = np.array(camera.basis()), (np.array(scene.domain.lower), np.array(scene.domain.upper))
+    corner, across, along = lighting.floor_frame(camera, basis, box)
+    spot = basis @ (0.5 * (box[0] + box[1]) * [1, 1, 0] - np.asarray(camera.eye)) - corner  # the middle of z = 0
+    assert (spot @ across, spot @ along) == pytest.approx((0.5, 0.5))
+    plane, _ = lighting.ground_plane(camera, basis, box, 1.0, True)
+    np.testing.assert_allclose(plane, [*(basis @ [0, 0, 1]), camera.eye[2]], atol=1e-12)
+
+
+def test_options_are_typed_as_they_are():
+    assert get_type_hints(PictureChoices) == get_type_hints(PictureOptions)
+    assert picture_options(colour_by="speed", views=("top",)) == PictureOptions(colour_by="speed", views=("top",))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"color_by": "speed"}, "picture option 'color_by' is unknown; did you mean 'colour_by'"),
+        ({"colour_by": "sped"}, "colour_by 'sped' is unknown; did you mean 'speed'"),
+        ({"views": ("frontt",)}, "view 'frontt' is unknown; did you mean 'front'"),
+        ({"quality": "high"}, r"quality 'high' is unknown \(known: draft, good, best\)"),
+    ],
+)
+def test_a_wrong_option_is_named_with_what_is_meant(options, said):
+    with pytest.raises(rts.RenderError, match=said):
+        picture_options(**options)

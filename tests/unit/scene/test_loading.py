@@ -195,3 +195,16 @@ def test_messages_shorten_long_lists():
     assert str(raised.value) == "MovingWall: times (0.0, 0.01, 0.02, ..., 0.0) (401 entries) must ascend"
     with pytest.raises(rts.SceneError, match=r"times \(0.0, 2.0, 1.0\) must ascend"):
         rts.MovingWall("x-", times=[0, 2, 1], displacements=[0, 0, 0])
+
+
+def test_every_key_of_every_object_is_described():
+    schema = rts.scene_schema()
+    missing = [
+        f"{name}.{key}"
+        for name, part in {"Scene": schema, **schema["$defs"]}.items()
+        for key, value in part["properties"].items()
+        if len(value.get("description", "")) < 3
+    ]
+    assert not missing
+    assert schema["$defs"]["Keyframes"]["properties"]["times"]["description"].startswith("[s], (K,), ascending")
+    assert "Attributes" not in str(schema)

@@ -198,3 +198,20 @@ def test_a_scene_with_everything_comes_back_from_plain_data(tmp_path):
     assert set(rts.Scene.__dataclass_fields__) - unlike <= left_out | {"domain", "spacing"}
     np.testing.assert_allclose(everything.fluids[3].positions, cloud + np.array([0.0, 0.05]))
     assert everything.fluid_colours == ("red", None, "#00ff00", "blue", None)
+
+
+@pytest.mark.parametrize(
+    ("changes", "up"),
+    [
+        ({}, (0.0, 1.0, 0.0)),
+        ({"gravity": (0, 0, -9.81)}, (0.0, 0.0, 1.0)),
+        ({"gravity": (3, 0, 4)}, (-0.6, 0.0, -0.8)),
+        ({"gravity": (0, 0, 0)}, (0.0, 1.0, 0.0)),
+        ({"gravity": (0, 0, 0), "gravity_changes": [rts.GravityChange(0.5, (0, 0, -1))]}, (0.0, 0.0, 1.0)),
+        ({"gravity": (0.8, 0, 0), "periodic": ("x",)}, (0.0, 1.0, 0.0)),  # drives a flow, and is no weight
+    ],
+)
+def test_up_is_against_gravity(changes, up):
+    box = rts.Box((0, 0, 0), (1, 1, 1))
+    scene = rts.Scene(domain=box, fluids=[rts.Block((0, 0, 0), (1, 1, 1))], spacing=0.1, sound_speed=20.0, **changes)
+    assert scene.up == pytest.approx(up, abs=0.0)

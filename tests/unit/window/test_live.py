@@ -132,7 +132,7 @@ def test_recordings_are_numbered_and_end_with_a_film_the_plot_follows_and_a_blow
     for _ in range(3):
         session.advance()
         for _ in range(2):  # without a step nothing is added
-            session.capture(camera, OUTLINE, session.entries(), session.lines())
+            session.capture(camera, OUTLINE, session.lines())
     check_that_the_plot_stacks_shares_of_levels(session)
     press(session, "v")
     folder = tmp_path / "window" / "recording-001"
@@ -152,6 +152,29 @@ def test_recordings_are_numbered_and_end_with_a_film_the_plot_follows_and_a_blow
     assert "0 frames in" in session.message
     assert session.message.endswith("recording-002; no video: --video needs the package imageio-ffmpeg")
     check_that_a_blow_up_pauses_and_says_why(session, monkeypatch)
+
+
+def test_a_recording_has_the_legend_of_what_it_colours(session, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(film.legend, "draw_legend", lambda image, title, entries, lines: drawn.append(entries) or image)
+    monkeypatch.setattr(film.legend, "draw_colour_bar", lambda image, *bar: drawn.append(bar[:4]) or image)
+    camera = Camera.framing(*OUTLINE, aspect=4 / 3)
+    press(session, "v")
+    for mode in ("level", "fluid", "pressure"):
+        session._paint(colour_by=mode)
+        session.film.time = -1.0
+        session.capture(camera, OUTLINE, session.lines())
+    levels, fluids, none, bar = drawn
+    assert [name for name, _, _ in levels] == ["level 1", "level 2", "level 3"]
+    assert [(name, share) for name, _, share in fluids] == [("fluid 1", 1.0)]
+    assert none == []
+    top = 0.5e-3 * 1000.0 * SCENE.estimate_max_speed() ** 2
+    assert bar == ("pressure", 0.0, pytest.approx(top), "kPa")
+    corners, shades = live.bar_plot(session.bar().colours, 400, 300)
+    assert corners.shape == (6 * 64, 2) == (len(shades), 2)
+    assert np.ptp(corners, axis=0) * [400, 300] == pytest.approx([live.PLOT_WIDTH, live.BAR_HEIGHT])
+    assert corners.min() > 0.0
+    np.testing.assert_array_equal(live.overlay(session, 400, 300)[0][-len(corners) :], corners)
 
 
 def check_that_the_plot_stacks_shares_of_levels(session):

@@ -141,7 +141,38 @@ def test_one_list_serves_all():
     assert list(sweeps.kinds())[:4] == list(sweeps.ONE_SOUND_SPEED) == ["uniform", "regional", "paper", "asynchronous"]
     assert list(sweeps.kinds())[4:] == ["uniform-c", "regional-c", "asynchronous-c"]
     assert {setup.name for _kind, setup in steppers.setups("mapped").values() if setup.regional_sound} == {
-        "adaptive_c",
-        "regional_c",
-        "asynchronous_c",
+        "uniform-c",
+        "regional-c",
+        "asynchronous-c",
     }
+
+
+def test_a_name_means_the_same_stepper_in_comparisons_and_in_the_map():
+    compared, mapped = steppers.setups("compared"), steppers.setups("mapped")
+    assert set(compared) <= set(mapped)
+    for name, (kind, setup) in compared.items():
+        assert (mapped[name][0], mapped[name][1].parameters) == (kind, setup.parameters), name
+
+
+def test_a_stepper_may_be_given_by_its_name():
+    assert steppers.as_stepper("uniform") == rts.Uniform()
+    assert steppers.as_stepper(None) == rts.Regional()
+    own = rts.Asynchronous(courant=0.3)
+    assert steppers.as_stepper(own) is own
+
+
+@pytest.mark.parametrize(
+    ("stepper", "said"),
+    [
+        ("regionl", "stepper 'regionl' is none of uniform, regional, asynchronous; did you mean 'regional'"),
+        (rts.Regional, r"stepper Regional is a class; give an object of it, Regional\(\)"),
+        (0.4, "stepper 0.4 is none; give e.g. rts.Regional"),
+    ],
+)
+def test_what_is_meant_by_no_stepper_is_said(stepper, said):
+    with pytest.raises(rts.StepperError, match=said):
+        steppers.as_stepper(stepper)
+
+
+def test_the_package_lists_what_is_public():
+    assert set(dir(rts)) == {*rts.__all__, "__version__"}
