@@ -65,7 +65,7 @@ def assemble(
         stepper.make_integrator(),
         medium,
         integrates_density=density.integrates,
-        obstacles=make_keepers(scene, geometry),
+        keepers=make_keepers(scene, geometry),
     )
     outlets = Outlets(scene, motion, start.mass) if scene.outlets else None
     schedule = stepper.schedule(scene, particles, grid, timeline)

@@ -9,15 +9,18 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from taichi_rts.device.backend import Backend, has_vulkan_hardware
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.errors import ResourceError
 from taichi_rts.scene.checks.size import finest_spacing, size_of
 from taichi_rts.scene.obstacles.making import make_solid
-from taichi_rts.scene.obstacles.solid import grid_nodes
+from taichi_rts.scene.obstacles.solid import PAD, grid_nodes
 from taichi_rts.scene.placing import origin_of, translated
 from taichi_rts.solver.grid import resorting
 from taichi_rts.solver.grid.windows import entries, room
+from taichi_rts.solver.physics.keepers import MOST_BINS
 from taichi_rts.solver.stepping.timeline import MAX_TICKS
 
 if TYPE_CHECKING:
@@ -106,7 +109,7 @@ def buffer_bytes(
         "walls": (size.walls + _lining(scene, spacing)) * real * wall_reals
         + size.particles * real * 2 * faces
         + size.blocks * walls_per_block,
-        "the distances from obstacles": nodes * real,
+        "the distances from obstacles": nodes * real + INTEGER * _bins(scene, spacing),
         "steps": size.particles * INTEGER * 2 + size.blocks * steps_per_block + FIXED,
     }
 
@@ -126,6 +129,19 @@ def _nodes(scene: Scene, spacing: float | None) -> list[float]:
         _origin, shape, _step = grid_nodes(solid.lower, solid.upper, spacing or scene.spacing)
         found.append(math.prod(map(float, shape)))
     return found
+
+
+def _bins(scene: Scene, spacing: float | None) -> float:
+    """Number of bins, and of entries in them, in which obstacles at rest are looked up, at most."""
+    s = spacing or scene.spacing
+    resting = [each for each in scene.obstacles if each.motion is None]
+    if not resting:
+        return 0.0
+    solids = [make_solid(each, scene.spacing, scene.domain) for each in resting]
+    extents = np.array([solid.upper - solid.lower for solid in solids]) + 3.0 * PAD * s
+    whole = np.max([solid.upper for solid in solids], axis=0) - np.min([solid.lower for solid in solids], axis=0)
+    bins = float(np.prod((whole + 3.0 * PAD * s) / (2.0 * PAD * s) + 1.0))
+    return min(bins, 2.0**scene.dim * MOST_BINS) + float(np.prod(extents / (2.0 * PAD * s) + 2.0, axis=1).sum())
 
 
 def _lining(scene: Scene, spacing: float | None) -> float:

@@ -37,12 +37,12 @@ class Motion:
         medium: Medium,
         *,
         integrates_density: bool = False,
-        obstacles: Sequence[Any] = (),
+        keepers: Sequence[Any] = (),
     ) -> None:
         self.integrates_density = integrates_density
         self.moving_walls = momentum.moving
         self.faces = [wall for wall in momentum.moving if isinstance(wall, MovingFace)]
-        self.obstacles = list(obstacles)
+        self.keepers = list(keepers)
         self.particles = particles
         self.near = near
         self.grid = grid
@@ -212,12 +212,10 @@ class Motion:
                     self.stopped.add(0, 1)
                     if (x[d] - inside[d]) * (v[d] - v_face[d]) > 0.0:
                         v[d] = v_face[d]
-        for obstacle in ti.static(self.obstacles):
-            held, normal, v_surface = obstacle.hold(inside, present, tick, 0.0)
-            if normal.norm_sqr() > 0.0:
-                self.stopped_by_obstacles.add(0, 1)
-                inside = self.geometry.place(held)
-                v -= ti.min((v - v_surface).dot(normal), 0.0) * normal
+        for keeper in ti.static(self.keepers):
+            inside, v, times = keeper.hold(inside, v, present, tick, 0.0)
+            if times > 0:
+                self.stopped_by_obstacles.add(0, times)
         if ti.static(self.particles.has_budget):
             a_walls = a
             for d in ti.static(range(self.particles.dim)):
@@ -261,9 +259,8 @@ class Motion:
         for i in range(self.particles.alive[None]):
             dt = self.elapsed(i, now, tick) + ahead
             position = self.position(i, dt, tick)
-            for obstacle in ti.static(self.obstacles):
-                held, _normal, _velocity = obstacle.hold(position, now, tick, ahead)
-                position = held
+            for keeper in ti.static(self.keepers):
+                position, _slowed, _times = keeper.hold(position, ti.zero(position), now, tick, ahead)
             velocity = self.particles.v[i] + self.particles.a[i] * dt
             if ti.static(self.particles.has_past):
                 velocity = self.velocity(i, dt, tick)
