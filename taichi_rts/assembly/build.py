@@ -71,7 +71,7 @@ def assemble(
         stepper.make_integrator(),
         medium,
         density,
-        obstacles=make_keepers(scene, geometry),
+        keepers=make_keepers(scene, geometry),
         past=past,
         guides=[Guide(particles)] if patches else [],
         books=[Books(particles, momentum)] if debug else [],

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from taichi_rts.assembly.build import make_geometry, optional_fields
 from taichi_rts.device.backend import Backend
@@ -19,8 +22,9 @@ from taichi_rts.solver.grid.windows import FluidWindows, WallWindows, entries, r
 from taichi_rts.solver.motion.outlet import Outlets
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
 from taichi_rts.solver.particles.particles import FluidState
+from taichi_rts.solver.physics.keepers import DistanceTables, RestingKeeper, bin_solids
 from taichi_rts.solver.physics.moving_walls import MovingFace
-from taichi_rts.solver.physics.obstacles import Keeper, MovingBody
+from taichi_rts.solver.physics.obstacles import MovingBody
 from taichi_rts.solver.physics.walls import Walls
 from taichi_rts.solver.sound.rule import SoundRule
 from taichi_rts.solver.stepping.base import Stepper
@@ -49,7 +53,8 @@ class Counts:
         at_rest: wall particles that do not move, also those of obstacles.
         faces: wall particles of each moving face.
         bodies: wall particles of each moving obstacle, and blocks of its own grid.
-        nodes: along each axis of each obstacle's table of distances.
+        nodes: of all obstacles' tables of distances, and how many tables.
+        bins: in which obstacles at rest are looked up, and entries in them.
         window: particles that each window on the fluid has room for.
         wall_window: the same of the windows on the wall at rest.
     """
@@ -59,7 +64,8 @@ class Counts:
     at_rest: int
     faces: tuple[int, ...]
     bodies: tuple[tuple[int, int], ...]
-    nodes: tuple[tuple[int, ...], ...]
+    nodes: tuple[int, int]
+    bins: tuple[int, int]
     window: int
     wall_window: int
 
@@ -76,6 +82,7 @@ def count(scene: Scene, stepper: Stepper, spacing: float | None = None) -> Count
     lined = [_lining(scene, solid, s) for solid in solids]
     moving = bodies(scene)
     resting = sum(lined) - sum(lined[body.number] for body in moving)
+    tables = [grid_nodes(solid.lower, solid.upper, s) for solid in solids]
     window = room(dim, math.prod(geometry.sides) / s**dim)
     return Counts(
         particles=math.ceil(size.particles),
@@ -89,7 +96,8 @@ def count(scene: Scene, stepper: Stepper, spacing: float | None = None) -> Count
             )
             for body in moving
         ),
-        nodes=tuple(tuple(map(int, grid_nodes(solid.lower, solid.upper, s)[1])) for solid in solids),
+        nodes=(sum(math.prod(map(int, shape)) for _origin, shape, _step in tables), len(tables)),
+        bins=_bins([table for k, table in enumerate(tables) if scene.obstacles[k].motion is None], s),
         window=window,
         wall_window=math.ceil(WALL_SHARE * scene.wall_planes * 2.0 / scene.support_ratio * window),
     )
@@ -118,9 +126,8 @@ def declared_fields(
         ],
         "walls": list(_walls(scene, backend, counts)),
         "the distances from obstacles": [
-            field
-            for k, nodes in enumerate(counts.nodes)
-            for field in within(f"motion.obstacles.{k}", Keeper.fields(nodes))
+            *(within("tables", DistanceTables.fields(*counts.nodes, dim)) if scene.obstacles else []),
+            *(within("keepers", RestingKeeper.fields(*counts.bins)) if counts.bins[0] else []),
         ],
         "steps": [
             *(within("outlets", Outlets.fields(particles)) if scene.outlets else []),
@@ -132,6 +139,16 @@ def declared_fields(
         found[purpose] = [each for each in declared if each.name not in names]
         names.update(each.name for each in declared)
     return found
+
+
+def _bins(tables: list[tuple[np.ndarray, Any, float]], spacing: float) -> tuple[int, int]:
+    """Number of bins' starts, and of entries in them, for obstacles at rest with these tables' origins, shapes and steps."""
+    if not tables:
+        return 0, 0
+    low = np.array([origin for origin, _shape, _step in tables])
+    high = low + [step * (np.array(shape) - 1) for _origin, shape, step in tables]
+    _origin, _shape, _side, start, entries = bin_solids(low, high, spacing)
+    return len(start), len(entries)
 
 
 def _windows(scene: Scene, backend: Backend, counts: Counts, needs: frozenset[str]) -> list[Declared]:

@@ -13,8 +13,9 @@ from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.geometry import Geometry
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
+from taichi_rts.solver.physics.keepers import DistanceTables, MovingKeeper, RestingKeeper
 from taichi_rts.solver.physics.moving_walls import MovingFace
-from taichi_rts.solver.physics.obstacles import Keeper, MovingBody
+from taichi_rts.solver.physics.obstacles import MovingBody
 from taichi_rts.solver.physics.walls import Walls
 
 
@@ -37,8 +38,15 @@ def make_walls(
     return still + faces + turning
 
 
-def make_keepers(scene: Scene, geometry: Geometry) -> list[Keeper]:
-    """Return what keeps centres out of each obstacle."""
-    moving = {body.number: body for body in bodies(scene)}
-    solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
-    return [Keeper(distance_grid(solid, scene.spacing), geometry, moving.get(k)) for k, solid in enumerate(solids)]
+def make_keepers(scene: Scene, geometry: Geometry) -> list[Any]:
+    """Return what keeps centres out of obstacles: one part for all that are at rest, one for each that moves."""
+    if not scene.obstacles:
+        return []
+    solids = (make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles)
+    grids = [distance_grid(solid, scene.spacing) for solid in solids]
+    tables = DistanceTables(grids, scene.dim)
+    at_rest = [k for k, obstacle in enumerate(scene.obstacles) if obstacle.motion is None]
+    keepers: list[Any] = []
+    if at_rest:
+        keepers.append(RestingKeeper(tables, at_rest, [grids[k] for k in at_rest], geometry, scene.spacing))
+    return keepers + [MovingKeeper(tables, body, geometry) for body in bodies(scene)]

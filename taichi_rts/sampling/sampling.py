@@ -107,5 +107,7 @@ def calibrate_mass(scene: Scene) -> float:
 def keep_outside(scene: Scene, solids: Sequence[Solid], x: np.ndarray) -> np.ndarray:
     """Leave out of `x` [m], (N, dim), what lies in an obstacle or nearer to it than half a spacing, as at the walls."""
     for solid in solids:
-        x = x[solid.distance(x) >= (0.5 - 1e-3) * scene.spacing]
+        near = np.asarray(((x > solid.lower - scene.spacing) & (x < solid.upper + scene.spacing)).all(axis=1))
+        near[near] = solid.distance(x[near]) < (0.5 - 1e-3) * scene.spacing
+        x = x[~near]
     return x

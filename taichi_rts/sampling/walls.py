@@ -144,8 +144,9 @@ def line_obstacles(scene: Scene, solids: Sequence[Solid]) -> tuple[WallLayer, ..
         layer = WallLayer(x, normals, volumes, depths, depth, wall_stiffness(scene))
         if at_rest[k]:
             kept = np.asarray(((x >= scene.domain.lower) & (x <= scene.domain.upper)).all(axis=1))
+            low, high = x.min(axis=0), x.max(axis=0)
             for other, its in zip(solids[:k], at_rest, strict=False):
-                if its:
+                if its and (other.lower < high).all() and (other.upper > low).all():
                     kept &= other.distance(x) > -0.99 * depth
             layer = layer.choose(kept)
         layers.append(layer)

@@ -15,8 +15,9 @@ from taichi_rts.device.fields import Declared
 from taichi_rts.sampling.sampling import sample
 from taichi_rts.scene.placing import at_origin
 from taichi_rts.solver.grid.windows import FluidWindows, WallWindows
+from taichi_rts.solver.physics.keepers import DistanceTables, RestingKeeper
 from taichi_rts.solver.physics.moving_walls import MovingFace
-from taichi_rts.solver.physics.obstacles import Keeper, MovingBody
+from taichi_rts.solver.physics.obstacles import MovingBody
 from taichi_rts.solver.physics.own_forces import own_forces
 
 FEW = 128
@@ -64,7 +65,10 @@ def counted(solver):
         at_rest=sum(wall.count for wall in still),
         faces=tuple(wall.count for wall in solver.walls if isinstance(wall, MovingFace)),
         bodies=tuple((wall.count, wall.geometry.blocks) for wall in solver.walls if isinstance(wall, MovingBody)),
-        nodes=tuple(keeper.shape for keeper in parts(solver, Keeper)),
+        nodes=next(
+            ((tables.values.shape[0], tables.scale.shape[0]) for tables in parts(solver, DistanceTables)), (0, 0)
+        ),
+        bins=next(((keeper.start.shape[0], keeper.near.shape[0]) for keeper in parts(solver, RestingKeeper)), (0, 0)),
         window=max((windows.capacity for windows in parts(solver, FluidWindows)), default=0),
         wall_window=max((windows.capacity for windows in parts(solver, WallWindows)), default=0),
     )
@@ -126,7 +130,7 @@ def test_every_field_is_counted(case, made, start_taichi):
     with start_taichi("cpu", options[:3]) as backend:
         scene, stepper, counts, total = check(case, made, backend)
     estimate = memory.count(scene, stepper)
-    for exact in ("blocks", "nodes", "window"):
+    for exact in ("blocks", "nodes", "bins", "window"):
         assert getattr(estimate, exact) == getattr(counts, exact)
     said = memory.device_bytes(scene.with_sound_for(stepper), stepper, options[:3], debug="debug" in options)
     assert 1.0 <= said / total < 1.35  # wall particles, and the windows on them, are estimated from above

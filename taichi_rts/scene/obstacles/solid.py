@@ -9,6 +9,8 @@ import numpy as np
 
 GRID_STEPS = 2  # nodes of a signed-distance grid per spacing
 MOST_NODES = 2e7
+PAD = 2.0
+"""How far [spacings] a signed-distance grid reaches beyond its body."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class DistanceGrid:
 
 def grid_nodes(lower: np.ndarray, upper: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray, float]:
     """Origin [m], number of nodes, (dim,), and step [m] of a grid around a body, coarser for very large ones."""
-    pad = 2.0 * spacing
+    pad = PAD * spacing
     volume = float(np.prod(upper - lower + 2.0 * pad))
     step = max(spacing / GRID_STEPS, (volume / MOST_NODES) ** (1.0 / len(lower)))
     return lower - pad, np.ceil((upper - lower + 2.0 * pad) / step).astype(int) + 1, step

@@ -42,7 +42,7 @@ class Motion:
         medium: Medium,
         formulation: Density,
         *,
-        obstacles: Sequence[Any] = (),
+        keepers: Sequence[Any] = (),
         past: Sequence[Past] = (),
         guides: Sequence[Guide] = (),
         books: Sequence[Books] = (),
@@ -50,7 +50,7 @@ class Motion:
         self.formulation = formulation
         self.past, self.guides, self.books = list(past), list(guides), list(books)
         self.faces = [wall for wall in momentum.moving if isinstance(wall, MovingFace)]
-        self.obstacles = list(obstacles)
+        self.keepers = list(keepers)
         self.particles = particles
         self.near = near
         self.grid = grid
@@ -212,12 +212,10 @@ class Motion:
                     self.stopped.add(0, 1)
                     if (x[d] - inside[d]) * (v[d] - v_face[d]) > 0.0:
                         v[d] = v_face[d]
-        for obstacle in ti.static(self.obstacles):
-            held, normal, v_surface = obstacle.hold(inside, present, tick, 0.0)
-            if normal.norm_sqr() > 0.0:
-                self.stopped_by_obstacles.add(0, 1)
-                inside = self.geometry.place(held)
-                v -= ti.min((v - v_surface).dot(normal), 0.0) * normal
+        for keeper in ti.static(self.keepers):
+            inside, v, times = keeper.hold(inside, v, present, tick, 0.0)
+            if times > 0:
+                self.stopped_by_obstacles.add(0, times)
         return inside, v
 
     @ti.kernel
@@ -241,9 +239,8 @@ class Motion:
         for i in range(self.particles.alive[None]):
             dt = self.elapsed(i, now, tick) + ahead
             position = self.position(i, dt, tick)
-            for obstacle in ti.static(self.obstacles):
-                held, _normal, _velocity = obstacle.hold(position, now, tick, ahead)
-                position = held
+            for keeper in ti.static(self.keepers):
+                position, _slowed, _times = keeper.hold(position, ti.zero(position), now, tick, ahead)
             velocity = self.particles.v[i] + self.particles.a[i] * dt
             if ti.static(len(self.past) > 0):
                 velocity = self.velocity(i, dt, tick)

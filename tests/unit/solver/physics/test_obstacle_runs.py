@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.assembly.inventory import parts
+from taichi_rts.assembly.inventory import State, parts
 from taichi_rts.device.backend import ti
 from taichi_rts.scene.geometry.bodies import bodies
 from taichi_rts.scene.obstacles.making import make_solid
@@ -161,6 +161,42 @@ def test_blocks_know_the_speed_of_a_body_before_it_arrives(simulate, unstarted):
     assert (found[np.abs(x - 0.35) > 0.3] == 0.0).all()
     turning = speeds(0.3)
     np.testing.assert_allclose(turning[np.abs(x - 0.5) < 0.15], 0.5 * np.pi / 0.3 * np.hypot(0.1, 0.1), rtol=1e-6)
+
+
+@ti.data_oriented
+class Hold:
+    def __init__(self, motion, points):
+        self.motion, self.count = motion, len(points)
+        self.x = ti.Vector.field(2, float, self.count)
+        self.x.from_numpy(points)
+
+    @ti.kernel
+    def all(self):
+        for k in range(self.count):
+            for keeper in ti.static(self.motion.keepers):
+                self.x[k], _v, _times = keeper.hold(self.x[k], ti.zero(self.x[k]), 0, 1.0, 0.0)
+
+
+def test_obstacles_at_rest_are_data(simulate, unstarted, monkeypatch):
+    """Forty times as many obstacles are no more code and no more fields, and each of them keeps out what comes into it."""
+    traced, sizes, every = [], [], np.ndindex
+    monkeypatch.setattr(np, "ndindex", lambda *shape: (traced.append(shape), every(*shape))[1])
+    for count in (5, 200):
+        discs = tuple(rts.SphereObstacle((0.1 + 0.1 * (k % 9), 0.1 + 0.03 * (k // 9)), 0.012) for k in range(count))
+        scene = rts.Scene(UNIT, (rts.Block((0, 0.85), (1, 1)),), 0.02, sound_speed=40.0, obstacles=discs)
+        sim = simulate(scene, rts.Uniform())
+        middles = np.array([disc.centre for disc in discs]) + np.array([0.004, 0.003])
+        points = np.concatenate([middles, [[0.95, 0.9], [0.15, 0.1]]])
+        hold = Hold(sim.motion, points)
+        traced.clear()
+        hold.all()
+        sizes.append((len(traced), len(State(sim.solver, everything=True).fields)))
+        x = hold.x.to_numpy()
+        far = np.linalg.norm(x[:-2] - [disc.centre for disc in discs], axis=1)
+        np.testing.assert_allclose(far, 0.012, atol=0.002)
+        np.testing.assert_array_equal(x[-2:], points[-2:])
+    assert sizes[0] == sizes[1]
+    assert sizes[0][0] > 0
 
 
 @pytest.mark.slow
