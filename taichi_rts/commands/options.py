@@ -41,7 +41,7 @@ class SceneOptions:
 
 @dataclasses.dataclass(frozen=True)
 class StepperOptions:
-    """How it steps: the parameters of all steppers; None leaves one at its stepper's own default."""
+    """How it steps: the parameters of all steppers. What is left out has its stepper's own default."""
 
     stepper: StepperName | None = None
     """One step for all, a step for each block, or a time for each block; by default regional."""

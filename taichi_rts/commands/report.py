@@ -19,6 +19,7 @@ from taichi_rts.medium.energy import Energy
 from taichi_rts.readings.diagnosis import Diagnosis
 from taichi_rts.readings.levels import level_classes, milliseconds
 from taichi_rts.sampling.sampling import fluid_positions
+from taichi_rts.scene.checks.size import size_of
 from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
 from taichi_rts.terminal import Progress, console, rate
@@ -29,12 +30,15 @@ LITTLE_ENERGY = 1e-4
 """If the energy at the start is a smaller share of what could move than this, changes are given in J, not in
 percent."""
 
+QUICKLY_COUNTED = 1e6
+"""Particles that are laid out only to be counted, at most."""
+
 
 def announce(scene: Scene, runs: int, device: Backend) -> None:
     """Say what begins: the first of all takes long, as kernels are compiled and kept for the next run."""
-    count = (
-        f"{sum(map(len, fluid_positions(scene))):,} particles, spacing {scene.spacing:.4g} m, to {scene.end_time:g} s"
-    )
+    about = size_of(scene).particles
+    particles = f"about {about:,.0f}" if about > QUICKLY_COUNTED else f"{sum(map(len, fluid_positions(scene))):,}"
+    count = f"{particles} particles, spacing {scene.spacing:.4g} m, to {scene.end_time:g} s"
     each = f", {runs} runs" if runs > 1 else ""
     console.print(
         f"{scene.name}: {count}, on {device.arch}{each}; compiling ...", soft_wrap=True, highlight=False, markup=False

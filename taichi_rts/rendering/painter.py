@@ -28,7 +28,7 @@ MOST_VIEWS = 4
 
 @dataclass(frozen=True)
 class PictureOptions:
-    """How pictures look; None for `azimuth` and `elevation` [degrees] takes the scene's own view.
+    """How pictures look. `azimuth` and `elevation` [degrees] are the scene's own view if left out.
 
     Several `views` stand side by side in a picture of `width` x `height` pixels; "scene", in perspective, is what no views
     give. Raises `RenderError` for more than four, and for what the renderer cannot do.

@@ -71,7 +71,8 @@ def test_examples_use_every_key_of_a_scene():
         "walls",
         "outlets",
     } | {
-        "kinematic_viscosity"  # each fluid's own is used
+        "kinematic_viscosity",  # each fluid's own is used
+        "gravity_interpolation",
     }
 
 

@@ -215,7 +215,7 @@ COMMANDS = [
         "stability: no such stepper",
         ("stability", "--steppers", "rk4", "--output-dir", "out"),
         "'rk4'",
-        "asynchronous_integers",
+        "asynchronous-integers",
     ),
     command("stability: tolerance 0", ("stability", "--tolerance", "0", "--output-dir", "out"), "tolerance 0", "0.001"),
     command(

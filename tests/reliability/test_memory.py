@@ -33,8 +33,9 @@ def made(monkeypatch):
     def counting(make, entries):
         def counted(*args, **options):
             dtype, shape = args[entries], args[entries + 1]
-            count = math.prod(args[:entries]) * (math.prod(shape) if isinstance(shape, tuple) else shape)
-            if declaring and count > 1:
+            places = math.prod(shape) if isinstance(shape, tuple) else shape
+            count = math.prod(args[:entries]) * places
+            if declaring and places > 1:
                 found.declared.append(count * (8 if ti.lang.util.cook_dtype(dtype) in (ti.f64, ti.i64) else 4))
             else:
                 found.others.append(count)

@@ -15,7 +15,7 @@ RED, BLUE, GREY = (0.9, 0.1, 0.1), (0.1, 0.1, 0.9), (0.5, 0.5, 0.5)
 
 @pytest.fixture(scope="module")
 def splatter(start_taichi, quick):
-    """One for all tests but the last, which start Taichi anew."""
+    """One for all tests but the last two, which start Taichi anew."""
     with start_taichi("cpu", "f32", **quick):
         yield Splatter(WIDTH, HEIGHT, supersample=2)
 
@@ -226,6 +226,36 @@ def test_impossible_pictures_are_refused():
         Splatter(64, 64, supersample=9)
 
 
+@pytest.mark.parametrize("camera", [FRONT, Camera((4, 6, 9), (0, 0, 0), field_of_view=40.0)])
+def test_samples_are_left_out_only_where_they_would_find_nothing(splatter, monkeypatch, camera):
+    positions, colours = cloud(40)
+    sum_tiles, marked, tiles = splat_kernels.sum_tiles, [], []
+
+    def look(width, height, sums):
+        sum_tiles(width, height, sums)
+        marked.append(int(sums.to_numpy().max()))
+
+    def mark_all(width, height, sums):
+        across, down = (length // splat_kernels.BROAD + 1 for length in (width - 1, height - 1))
+        sums.from_numpy(np.outer(np.arange(down + 1), np.arange(across + 1)).ravel().astype(np.int32))
+        tiles.append(across * down)
+
+    monkeypatch.setattr(splat_kernels, "sum_tiles", look)
+    picture = splatter.draw(positions, colours, 0.1, camera, ((-4, -2, -4), (4, 2, 4)))
+    monkeypatch.setattr(splat_kernels, "sum_tiles", mark_all)
+    whole = splatter.draw(positions, colours, 0.1, camera, ((-4, -2, -4), (4, 2, 4)))
+    assert len(marked) == len(tiles) == 2
+    assert all(0 < few < total for few, total in zip(marked, tiles, strict=True))
+    assert np.array_equal(picture, whole)
+
+
+def test_few_spheres_are_drawn_in_one_pass_with_the_same_pixels(splatter, monkeypatch):
+    positions, colours = cloud(300)
+    picture = splatter.draw(positions, colours, 0.3, FRONT)
+    monkeypatch.setattr(splat_kernels, "FEW", 0)
+    assert np.array_equal(splatter.draw(positions, colours, 0.3, FRONT), picture)
+
+
 def test_default_precision_of_the_run_does_not_matter(taichi_cpu, tmp_path):
     positions, colours = cloud(500)
     single = Splatter(WIDTH, HEIGHT).draw(positions, colours, 0.1, FRONT).astype(int)
@@ -244,27 +274,3 @@ def test_vulkan_draws_what_the_processor_draws(start_taichi):
         with start_taichi(arch):
             pictures.append(Splatter(WIDTH, HEIGHT).draw(positions, colours, 0.2, FRONT, box).astype(int))
     assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 2).mean() < 1e-3
-
-
-@pytest.mark.parametrize("camera", [FRONT, Camera((4, 6, 9), (0, 0, 0), field_of_view=40.0)])
-def test_samples_are_left_out_only_where_they_would_find_nothing(splatter, monkeypatch, camera):
-    positions, colours = cloud(40)
-    picture = splatter.draw(positions, colours, 0.1, camera, ((-4, -2, -4), (4, 2, 4)))
-    needed = splatter._spheres.to_numpy()[-1], splatter._shaded.to_numpy()[-1]
-    assert 0 < needed[0] < (len(splatter._spheres.to_numpy()))
-
-    def mark_all(width, height, sums):
-        across, down = (length // splat_kernels.BROAD + 1 for length in (width - 1, height - 1))
-        sums.from_numpy(np.outer(np.arange(down + 1), np.arange(across + 1)).ravel().astype(np.int32))
-
-    monkeypatch.setattr(splat_kernels, "sum_tiles", mark_all)
-    whole = splatter.draw(positions, colours, 0.1, camera, ((-4, -2, -4), (4, 2, 4)))
-    assert splatter._shaded.to_numpy()[-1] > needed[1]
-    assert np.array_equal(picture, whole)
-
-
-def test_few_spheres_are_drawn_in_one_pass_with_the_same_pixels(splatter, monkeypatch):
-    positions, colours = cloud(300)
-    picture = splatter.draw(positions, colours, 0.3, FRONT)
-    monkeypatch.setattr(splat_kernels, "FEW", 0)
-    assert np.array_equal(splatter.draw(positions, colours, 0.3, FRONT), picture)
