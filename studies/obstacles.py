@@ -37,7 +37,7 @@ def leaks(end, spacing):
     scene = scene.replace(obstacles=scene.obstacles[:2])
     meshes = [trimesh.load_mesh(obstacle.file).apply_translation(obstacle.translation) for obstacle in scene.obstacles]
     for stepper in (rts.Uniform(), rts.Regional(), rts.Asynchronous()):
-        rts.init("cpu")
+        rts.init("cpu", restart=True)
         sim = rts.Simulation(scene, stepper)
         inside, frames = 0, np.arange(1, round(20 * end) + 1) / 20
         for time in frames:

@@ -35,7 +35,7 @@ def measure(case):
         if name == "uniform" or case.all_steppers:
             found[name] = []
             for spacing in case.spacings:
-                rts.init("cpu", "f64")
+                rts.init("cpu", "f64", restart=True)
                 found[name].append(run(case, stepper, spacing)[0])
                 ti.reset()
     return found

@@ -26,7 +26,7 @@ END = 1.5  # [s]
 if __name__ == "__main__":
     print("| density, kernel, r/s | stops, speed, depth |\n|---|---|")
     for density, kernel, ratio in POOLS:
-        rts.init("cpu", "f32")
+        rts.init("cpu", "f32", restart=True)
         sim = rest(3, ratio, kernel, density, END)
         x, v, stopped = sim.positions(), sim.velocities().astype(float), sim.statistics["stopped_by_domain"]
         speed = np.sqrt((v**2).sum(axis=1).mean()) / CALM
