@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from taichi_rts.assembly.work import speedup_bound
 from taichi_rts.device import forks
 from taichi_rts.device.backend import Backend
 from taichi_rts.medium.energy import Energy
@@ -26,6 +25,8 @@ from taichi_rts.terminal import Progress, console, rate
 
 NOTABLE_GAIN = 0.01
 """Share of its energy that a run may gain without a warning, as in the conformance tests."""
+LONGEST_STEP = 0.6
+"""Longest uniform step [r/c_s] that a run is held against: what the stability map shows to hold everywhere."""
 LITTLE_ENERGY = 1e-4
 """If the energy at the start is a smaller share of what could move than this, changes are given in J, not in
 percent."""
@@ -95,15 +96,14 @@ def print_table(
     facts.add_row("particles", f"{sim.count:,}, spacing {sim.scene.spacing:.4g} m")
     active, base_steps = statistics["active_fraction"], statistics["base_steps"]
     facts.add_row("active fraction", f"{active:.3f}")
-    facts.add_row("updates saved", f"{1.0 - active:.1%} over uniform steps of the base step")
     facts.add_row("base steps", f"{base_steps:,} in {statistics['wall_seconds']:.2f} s")
     facts.add_row("updates", rate(statistics["particle_updates"], statistics["wall_seconds"]))
-    overhead = statistics["overhead_fraction"]
-    if overhead is not None:
-        passes = statistics.get("passes", base_steps) / max(1, base_steps)
-        bound = speedup_bound(active, overhead, passes)
-        facts.add_row("overhead (ε)", f"{overhead:.1%} of a full step: work for all particles, due or not")
-        facts.add_row("speed-up bound", f"{bound:.2f} over uniform steps of the base step")
+    if statistics["overhead_fraction"] is not None:
+        facts.add_row(
+            "overhead (ε)", f"{statistics['overhead_fraction']:.1%} of a full step: work for all particles, due or not"
+        )
+    for name, fact in uniform_facts(sim, statistics):
+        facts.add_row(name, fact)
     for name, fact in pass_facts(statistics):
         facts.add_row(name, fact)
     if sim.keeps_momentum_budget:
@@ -171,6 +171,34 @@ def level_rows(sim: Simulation, statistics: Mapping[str, Any]) -> list[tuple[str
             share = sum(updates[each.first - 1 : each.last])
             rows.append((str(each), "–".join(steps), f"{each.share:.2%}", f"{share:.2%}"))
     return rows
+
+
+def uniform_facts(sim: Simulation, statistics: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return what uniform steps of this run's base step, and of its longest step, would have taken.
+
+    Their time is what this run has paid for an update, times their updates. The longest step is at most `LONGEST_STEP` r/c_s.
+    With a regional sound speed it is left out: the longest steps are then those of regions where sound is slow.
+    """
+    used = np.flatnonzero(statistics["update_fractions"])
+    if statistics["active_fraction"] in (0.0, 1.0) or not len(used):
+        return []
+    updates, seconds = statistics["particle_updates"], statistics["wall_seconds"]
+    base = sim.base_step
+    steps = [("base", base)]
+    if sim.sound is None:
+        limit = LONGEST_STEP * sim.scene.support / sim.medium.sound_speed
+        steps.append(("longest", max(base, min((int(used[-1]) + 1) * base, limit))))
+    found = []
+    for name, step in steps:
+        ratio = base / (step * statistics["active_fraction"])
+        found.append(
+            (
+                f"uniform, {name} step",
+                f"{milliseconds(step)} ms: {updates * ratio:,.0f} updates, {ratio:.2f} of this run's, "
+                f"so about {seconds * ratio:.3g} s",
+            )
+        )
+    return found
 
 
 def pass_facts(statistics: Mapping[str, Any]) -> list[tuple[str, str]]:

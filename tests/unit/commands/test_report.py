@@ -45,6 +45,11 @@ def rows(sim):
     return report.level_rows(sim, sim.statistics)
 
 
+def with_statistics(updates):
+    sim = simulation(rts.Regional(levels=len(updates)), updates, updates)
+    return sim, sim.statistics
+
+
 def test_every_regional_level_has_a_row():
     sim = simulation(rts.Regional(levels=3), [0.25, 0.75, 0.0], [0.4, 0.6, 0.0])
     assert rows(sim) == [
@@ -75,20 +80,35 @@ def test_table_shows_what_passes_cost(capsys, monkeypatch):
         "sound speed 10 m/s",
         "overhead (ε) 10.0% of a full step: work for all particles, due or not",
         "stopped by the domain 0 times a particle, at a face",
-        "updates saved 75.0% over uniform steps of the base step",
         "passes 50 in 13 cycles",
         "cells in a pass 1 to 1,234, median 7",
         "woken 4,321 particles",
         "steps too long 12: use more --levels",
         "extrapolations 0",
-        "speed-up bound 3.64 over",  # 1 / (0.1 * 50 / 100 + 0.9 * 0.25)
+        "uniform, base step 0.500 ms: 1,000 updates, 4.00 of this run's, so about 2 s",
+        "uniform, longest step 1.000 ms: 500 updates, 2.00 of this run's, so about 1 s",
         "energy dissipated 12.50% of 4 J at the start",
     ):
         assert fact in words
     report.print_table(simulation(rts.Regional(), [0.2, 0.8], [0.3, 0.7]), Energy(1.0, 2.0, 1.0))
-    words = " ".join(capsys.readouterr().out.split())
-    assert "speed-up bound 3.08 over" in words
-    assert "pass" not in words
+    assert "pass" not in capsys.readouterr().out
+
+
+def test_uniform_steps_are_as_long_as_sound_allows():
+    steps = {row[0]: row[1] for row in report.uniform_facts(*with_statistics([0.0] * 9 + [1.0]))}
+    assert steps["uniform, base step"].startswith("0.500 ms: 1,000 updates, 4.00 of this run's")
+    assert steps["uniform, longest step"].startswith("3.000 ms: 167 updates, 0.67 of this run's")  # 0.6 r/c, not 5 ms
+
+
+def test_longest_step_is_none_of_uniform_steps_where_sound_speeds_differ():
+    sim, statistics = with_statistics([0.5, 0.5])
+    sim.sound = object()
+    assert [name for name, _fact in report.uniform_facts(sim, statistics)] == ["uniform, base step"]
+
+
+def test_uniform_steps_are_held_against_nothing():
+    sim, statistics = with_statistics([1.0])
+    assert report.uniform_facts(sim, statistics | {"active_fraction": 1.0}) == []
 
 
 def test_energy_gained_asks_for_shorter_steps():
