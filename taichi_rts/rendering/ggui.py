@@ -80,8 +80,11 @@ class GguiRenderer:
         self.width, self.height, self.background = width, height, background
         self._window = open_window("taichi_rts", width, height, visible=False)
 
-    def draw(self, positions, colours, radius: float, camera: Camera, outline=None) -> np.ndarray:
-        """Return the picture, (height, width, 3) uint8; arguments as in `Splatter.draw`."""
+    def draw(
+        self, positions, colours, radius: float, camera: Camera, outline=None, *, box: bool = True, floor: bool = True
+    ) -> np.ndarray:
+        """Return the picture, (height, width, 3) uint8; arguments as in `Splatter.draw`. There are no shadows on a floor."""
+        outline = outline if box else None
         size = (self.width, self.height)
         compose(self._window, positions, colours, radius, camera, outline, self.background, size)
         buffer = self._window.get_image_buffer_as_numpy()  # (width, height, 4), upward; it consumes the frame

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypedDict, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -48,8 +49,20 @@ class PictureOptions:
     """Camera angle around the vertical [degrees]."""
     elevation: float | None = None
     """Camera angle above the ground [degrees]."""
+    eye: tuple[float, float, float] | None = None
+    """Where the camera is [m], instead of the angles; goes with --target."""
+    target: tuple[float, float, float] | None = None
+    """What it looks at [m]."""
+    zoom: float | None = None
+    """How much larger than the whole domain would be, or than from the eye."""
+    fov: float = 35.0
+    """Vertical angle of view [degrees]."""
     legend: bool = True
     """Draw the legend, with time and scale."""
+    box: bool = True
+    """Draw the edges of the domain."""
+    floor: bool = True
+    """Splatter: draw the shadow on the floor of the domain."""
     quality: Literal["draft", "good", "best"] = "good"
     """Splatter: draft has no shadows, best four times the samples of good (docs/rendering.md)."""
     transparent: bool = False
@@ -62,6 +75,14 @@ class PictureOptions:
             raise RenderError(
                 "--transparent and --quality are the splatter's; leave them out, or give --renderer splatter"
             )
+        if self.zoom is not None and not 0.0 < self.zoom < math.inf:
+            raise RenderError(f"--zoom {self.zoom:g} must be above 0; 2 shows everything twice as large")
+        if not 1.0 <= self.fov <= 170.0:
+            raise RenderError(f"--fov {self.fov:g} degrees is outside 1 to 170: 35 suits most scenes")
+        if (self.eye is None) != (self.target is None):
+            raise RenderError("--eye and --target go together; give both, or --azimuth and --elevation instead")
+        if self.eye is not None and (self.azimuth is not None or self.elevation is not None):
+            raise RenderError("--eye and --target stand instead of --azimuth and --elevation; leave out these or those")
         if len(self.views) > MOST_VIEWS:
             raise RenderError(f"{len(self.views)} views in one picture; at most {MOST_VIEWS} can be told apart")
 
@@ -82,7 +103,13 @@ class PictureChoices(TypedDict, total=False):
     palette: Literal["default", "paper"]
     azimuth: float | None
     elevation: float | None
+    eye: tuple[float, float, float] | None
+    target: tuple[float, float, float] | None
+    zoom: float | None
+    fov: float
     legend: bool
+    box: bool
+    floor: bool
     quality: Literal["draft", "good", "best"]
     transparent: bool
     views: tuple[ViewName, ...]
@@ -121,15 +148,33 @@ def make_renderer(options: PictureOptions) -> Any:
     return Splatter(*options.view_size, quality=options.quality, transparent=options.transparent)
 
 
+def seen_by(scene: Scene, options: PictureOptions) -> Scene:
+    """Return `scene` with the eye, target and zoom of the options, where they have them, as its own view.
+
+    Raises `RenderError` for a scene in two dimensions, which is seen from the front.
+    """
+    if options.eye is not None and scene.dim == 2:
+        raise RenderError("--eye and --target: a scene in two dimensions is seen from the front; leave them out")
+    wanted: dict[str, Any] = {"eye": options.eye, "target": options.target, "zoom": options.zoom}
+    wanted = {key: value for key, value in wanted.items() if value is not None}
+    return scene.replace(view=replace(scene.view, **wanted)) if wanted else scene
+
+
 def make_cameras(scene: Scene, options: PictureOptions) -> list[Camera]:
-    """Return the camera of each view; raises `RenderError` for views that the scene does not have, or angles besides."""
+    """Return the camera of each view, in coordinates counted from `origin_of` the scene.
+
+    Raises `RenderError` for views that the scene does not have, or angles besides.
+    """
+    scene = at_origin(seen_by(scene, options))
     if options.views and scene.dim == 2:
         raise RenderError(
             f"--views {' '.join(options.views)}: a scene in two dimensions has one view only; leave it out"
         )
-    if options.views and "scene" not in options.views and (options.azimuth, options.elevation) != (None, None):
+    own = (options.azimuth, options.elevation, options.eye, options.zoom)
+    if options.views and "scene" not in options.views and own != (None,) * 4:
         raise RenderError(
-            f"--views {' '.join(options.views)} have angles of their own; leave out --azimuth and --elevation"
+            f"--views {' '.join(options.views)} have angles of their own; "
+            "leave out --azimuth, --elevation, --eye, --target and --zoom"
         )
     return [make_camera(scene, options, view) for view in options.views or ("scene",)]
 
@@ -146,7 +191,8 @@ def make_camera(scene: Scene, options: PictureOptions, name: ViewName = "scene")
         return Camera.framing(*box, azimuth, elevation, width / height, scene.up, perspective=False)
     view = scene.view
     if view.eye is not None and view.target is not None and options.azimuth is None and options.elevation is None:
-        return Camera(view.eye, view.target, scene.up)
+        camera = Camera(view.eye, view.target, scene.up, options.fov)
+        return camera.zoomed(1.0 / view.zoom) if view.zoom != 1.0 else camera
     camera = Camera.framing(
         scene.domain.lower,
         scene.domain.upper,
@@ -154,6 +200,7 @@ def make_camera(scene: Scene, options: PictureOptions, name: ViewName = "scene")
         elevation=view.elevation if options.elevation is None else options.elevation,
         aspect=width / height,
         up=scene.up,
+        field_of_view=options.fov,
     )
     return camera.zoomed(1.0 / view.zoom) if view.zoom != 1.0 else camera
 
@@ -162,13 +209,13 @@ class Painter:
     """Paints states of one scene again and again with the same options."""
 
     def __init__(self, scene: Scene, options: PictureOptions, title: str = "", renderer: Any = None) -> None:
-        self.scene = scene = at_origin(scene)  # pictures are drawn in single precision
+        self.scene = at_origin(scene)  # pictures are drawn in single precision
         self.options = options
         self.title = title
         self.renderer = renderer if renderer is not None else make_renderer(options)
         self.cameras = make_cameras(scene, options)
-        self.obstacles = ObstaclePoints(scene, 0.5 * scene.spacing)
-        self.tints = Tints(scene)
+        self.obstacles = ObstaclePoints(self.scene, 0.5 * scene.spacing)
+        self.tints = Tints(self.scene)
 
     def paint(self, state: Readable) -> np.ndarray:
         """Return the picture of a `Reading`, or of a `Simulation` as it is now.
@@ -179,7 +226,10 @@ class Painter:
         tints = self.tints.of(now, self.options.colour_by, self.options.palette)
         outline = (self.scene.domain.lower, self.scene.domain.upper)
         x, tints = self.obstacles.add(now.local_positions, tints, now.time)
-        images = [self.renderer.draw(x, tints, 0.5 * self.scene.spacing, each, outline) for each in self.cameras]
+        shown = {"box": self.options.box, "floor": self.options.floor}
+        images = [
+            self.renderer.draw(x, tints, 0.5 * self.scene.spacing, each, outline, **shown) for each in self.cameras
+        ]
         image = self._joined(images) if len(images) > 1 else images[0]
         return self.label(image, now) if self.options.legend else image
 

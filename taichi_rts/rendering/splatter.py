@@ -127,12 +127,14 @@ class Splatter:
         self._points, self._tints = (ti.Vector.ndarray(3, ti.f32, self._capacity) for _ in range(2))
         self._sprites = ti.Vector.ndarray(4, ti.f32, self._capacity)
 
-    def draw(self, positions, colours, radius: float, camera: Camera, outline=None) -> np.ndarray:
+    def draw(
+        self, positions, colours, radius: float, camera: Camera, outline=None, *, box: bool = True, floor: bool = True
+    ) -> np.ndarray:
         """Return the picture, (height, width, 3) uint8, or 4 if `transparent`.
 
         `positions` (N, 2 or 3) [m] and `radius` [m] are in the scene's units, `colours` (N, 3) are
         sRGB in 0 to 1; `outline` is (lower, upper) of a box to draw as a wireframe,
-        whose floor then catches the shadows.
+        whose floor then catches the shadows; without `box` its edges are left out, without `floor` the shadows on it.
         """
         flat = np.ndim(positions) == 2 and np.shape(positions)[1] == 2
         positions, colours = checked_arrays(positions, colours, radius)
@@ -145,10 +147,10 @@ class Splatter:
         width, height = self._fine
         perspective = camera.orthographic_height is None
         lens = (camera.focal_pixels(height), float(perspective), width / 2, height / 2)
-        box = lighting.bounds(positions, outline)
+        bounds = lighting.bounds(positions, outline)
         light = lighting.light_direction(camera, basis)
         size = self.quality.shadow_size
-        light_basis, light_eye, light_lens = lighting.light_view(light, box, radius, size)
+        light_basis, light_eye, light_lens = lighting.light_view(light, bounds, radius, size)
 
         clear = splat_kernels.clear_buffer
         clear(self._shadow_depth, splat_kernels.FAR)
@@ -163,10 +165,12 @@ class Splatter:
         if count:
             self._project(count, radius, eye, basis, lens)
             self._splat(count, lens, self._fine, self._tiles, self._spheres, self._depth, self._nearest)
-        if outline is not None:
+        if outline is not None and box:
             self._trace(outline, camera, lens, radius)
-        extent = float(np.linalg.norm(box[1] - box[0]))
-        ground = lighting.ground_plane(camera, basis, box, extent, self.shadows and outline is not None and not flat)
+        extent = float(np.linalg.norm(bounds[1] - bounds[0]))
+        ground = lighting.ground_plane(
+            camera, basis, bounds, extent, self.shadows and outline is not None and floor and not flat
+        )
         reach = max(5 * radius, 0.03 * extent)
         texel = 1.0 / light_lens[0]
         softness = max(0.012 * extent / texel, 1.5)
@@ -221,8 +225,8 @@ class Splatter:
             *ground,
             GROUND_SHADE if ground[0][3] > 0 else 0.0,
             FLOOR_SHADE,
-            *lighting.floor_frame(camera, basis, box),
-            (0.0, 0.0, 0.0) if flat or outline is None else lighting.haze(camera, basis, box),
+            *lighting.floor_frame(camera, basis, bounds),
+            (0.0, 0.0, 0.0) if flat or outline is None else lighting.haze(camera, basis, bounds),
             srgb_to_linear(LINE_COLOUR),
             radius,
             width,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.rendering import colours
-from taichi_rts.rendering.painter import PictureOptions, make_camera
+from taichi_rts.rendering.painter import PictureOptions, make_camera, seen_by
 from taichi_rts.scene.placing import at_origin
 from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
@@ -65,7 +65,8 @@ def watch(
     free = max(64, options.width - round(PANEL_WIDTH))
     aside = 0.5 * (options.width - free) / options.height  # by which the scene is moved out from under the panel
     local = at_origin(scene)
-    camera = make_camera(local, dataclasses.replace(options, width=free)).panned(-aside, 0.0)
+    seen = at_origin(seen_by(scene, options))
+    camera = make_camera(seen, dataclasses.replace(options, width=free)).panned(-aside, 0.0)
     outline = (local.domain.lower, local.domain.upper)
     while window.running and not session.over:
         for key in window.pressed():

@@ -113,7 +113,7 @@ class Canvas:
     def __init__(self, width, height):
         self.shape, self.seen = (height, width, 3), []
 
-    def draw(self, positions, colours, radius, camera, outline):
+    def draw(self, positions, colours, radius, camera, outline, box, floor):
         self.seen.append((camera, positions))
         return np.full(self.shape, 100 + 20 * len(self.seen), np.uint8)
 
@@ -147,11 +147,29 @@ def test_two_views_show_the_same_state_at_one_time_in_a_picture_of_the_asked_siz
         ("dam_break", {"views": ("front",), "azimuth": 3.0}, "leave out --azimuth"),
         ("dam_break", {"views": ("front",) * 5}, "5 views in one picture; at most 4"),
         ("dam_break", {"transparent": True, "renderer": "ggui"}, "--renderer splatter"),
+        ("dam_break", {"views": ("front",), "zoom": 2.0}, "leave out .* --zoom"),
+        ("dam_break_2d", {"eye": (1, 1, 9), "target": (1, 1, 0)}, "seen from the front; leave them out"),
+        ("dam_break", {"eye": (1, 1, 1), "target": (1, 1, 1)}, "must be two places"),
     ],
 )
 def test_views_that_cannot_be_are_refused(scene, options, complaint):
     with pytest.raises(rts.Error, match=complaint):
         make_cameras(rts.load_scene(scene), PictureOptions(**options))
+
+
+def test_eye_target_zoom_and_angle_are_the_cameras():
+    scene = rts.load_scene("dam_break")
+    (camera,) = make_cameras(scene, PictureOptions(eye=(9, 5, 3), target=(1, 1, 0), zoom=2.0, fov=50.0))
+    assert (camera.eye, camera.target, camera.field_of_view) == ((5, 3, 1.5), (1, 1, 0), 50.0)
+    near, far = (make_cameras(scene, PictureOptions(zoom=zoom))[0] for zoom in (3.0, None))
+    assert near.view_height() == pytest.approx(far.view_height() / 3.0)
+
+
+def test_a_painter_takes_the_eye_in_the_scenes_own_coordinates():
+    scene = rts.load_scene("dam_break")
+    far = scene.replace(domain=rts.Box((1000, 0, 0), (1003, 2, 0.5)), fluids=(rts.Block((1000, 0, 0), (1001, 1, 0.5)),))
+    painter = Painter(far, PictureOptions(eye=(1009, 5, 3), target=(1001, 1, 0)), renderer=NOTHING)
+    assert np.subtract(painter.cameras[0].eye, painter.scene.domain.lower) == pytest.approx((9, 5, 3))
 
 
 def test_text_and_panels_are_three_times_as_large_in_4k():

@@ -147,6 +147,17 @@ def test_a_block_is_darker_under_one_that_floats_above_it(splatter):
     assert np.array_equal(*bare)
 
 
+def test_without_box_and_floor_there_is_nothing_but_spheres(splatter):
+    positions, colours = cloud(40)
+    box = ((-3, -3, -3), (3, 3, 3))
+    whole = covered(splatter.draw(positions, colours, 0.1, FRONT, box))
+    bare = covered(splatter.draw(positions, colours, 0.1, FRONT, box, box=False, floor=False))
+    edges = covered(splatter.draw(positions, colours, 0.1, FRONT, box, floor=False))
+    alone = covered(splatter.draw(positions, colours, 0.1, FRONT))
+    assert np.array_equal(bare, alone)
+    assert 0.01 < bare.mean() < edges.mean() < whole.mean()
+
+
 @pytest.mark.parametrize(("quality", "shades"), [("draft", 0), ("good", 3), ("best", 8)])
 def test_edges_have_intermediate_values(splatter, quality, shades):
     camera = Camera((0, 0, 10), (0, 0, 0), field_of_view=30.0)
