@@ -79,6 +79,16 @@ class MovingBody(Walls):
         return self.fluid.v[k] - self.velocity[n] - self.path.carried(self.spin[n], self.turn[n] @ self.x[b])
 
     @ti.func
+    def slip(self, k, b, x_ib, v_ib):
+        """Velocity [m/s] of the fluid at place `k` past the face, where the line to particle `b` crosses it.
+
+        There a turning body is as fast as fluid that rests on it. Its particles lie deeper, and so have another speed: those of
+        a cup are faster than its inside.
+        """
+        share = 1.0 - 1.0 / (self.shear(k, b, x_ib) * self.stiffness)  # of the way from b to k that lies in the body
+        return v_ib - share * self.path.carried(self.spin[self.block(k)], x_ib)
+
+    @ti.func
     def facing(self, k, b):
         """Normal of wall particle `b`, as the world sees it at the time of the particle at place `k`."""
         return self.turn[self.block(k)] @ self.normal[b]
