@@ -106,8 +106,15 @@ def calibrate_mass(scene: Scene) -> float:
 
 def keep_outside(scene: Scene, solids: Sequence[Solid], x: np.ndarray) -> np.ndarray:
     """Leave out of `x` [m], (N, dim), what lies in an obstacle or nearer to it than half a spacing, as at the walls."""
+    low, high = np.array(scene.domain.lower), np.array(scene.domain.upper)
+    around = np.array(scene.is_periodic)
     for solid in solids:
-        near = np.asarray(((x > solid.lower - scene.spacing) & (x < solid.upper + scene.spacing)).all(axis=1))
-        near[near] = solid.distance(x[near]) < (0.5 - 1e-3) * scene.spacing
+        y = x
+        crossed = around & ((solid.lower < low) | (solid.upper > high))
+        if crossed.any():  # a moving body: what lies nearest to it of the images of x
+            lengths = np.where(crossed, high - low, 1.0)
+            y = x - crossed * lengths * np.round((x - solid.middle) / lengths)
+        near = np.asarray(((y > solid.lower - scene.spacing) & (y < solid.upper + scene.spacing)).all(axis=1))
+        near[near] = solid.distance(y[near]) < (0.5 - 1e-3) * scene.spacing
         x = x[~near]
     return x

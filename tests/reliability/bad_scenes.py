@@ -202,6 +202,16 @@ SCENES = [
         "moving_walls.0: velocity has 3 components; the domain has 2",
     ),
     scene(
+        "a moving body that meets its own image",
+        with_parts(
+            TANK,
+            periodic=["x"],
+            obstacles=[{"shape": "box", "lower": [0.1, 0.2], "upper": [0.9, 0.4], "motion": {"velocity": [1.0, 0.0]}}],
+        ),
+        "from its pivot along the periodic axis 'x'",
+        "half the domain's length less a support radius",
+    ),
+    scene(
         "a periodic axis that does not exist",
         with_parts(TANK, periodic=["z"]),
         "periodic: axis 'z' does not exist in two dimensions",

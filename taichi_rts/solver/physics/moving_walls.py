@@ -16,8 +16,8 @@ from taichi_rts.solver.physics.walls import Walls
 class MovingFace(Walls):
     """Wall particles that move together, sorted once in their own frame; fluid is brought into that frame at its own time.
 
-    So readers at different times see the wall each at its own, and nothing has to be sorted again. A face that slides along itself
-    leaves its particles where they are, as it is even: only friction sees how fast it is.
+    So readers at different times see the wall each at its own, and nothing has to be sorted again. Those of a face that slides
+    along itself stay where they are, as it is even: only friction sees how fast it is.
     """
 
     moves = True

@@ -113,7 +113,7 @@ class Walls(Part):
 
     @ti.func
     def slip(self, k, b, x_ib, v_ib):
-        """Velocity [m/s] of the fluid at place `k` past the wall's face, where the line to particle `b` crosses it: friction's."""
+        """Velocity [m/s] of the fluid at place `k` past the wall's face, where the line to particle `b` crosses it."""
         return v_ib
 
     @ti.func

@@ -1,4 +1,4 @@
-"""Faces and bodies that slide along themselves or turn take the fluid along with their own speed, by friction alone."""
+"""Faces and bodies that slide along themselves, turn or cross a periodic axis: fluid follows them as it must."""
 
 import numpy as np
 import pytest
@@ -36,6 +36,36 @@ def test_lid_driven_cavity(simulate):
         row = np.digitize(x[middle, 1], np.linspace(0, 1, 21))
         rows.append([v[middle, 0][row == k].mean() for k in range(1, 21)])
     assert np.mean(rows, axis=0).min() == pytest.approx(-0.211, rel=0.03)  # Ghia, Ghia & Shin 1982, Re 100
+
+
+@pytest.mark.parametrize("shape", ["disc", pytest.param("bar", marks=pytest.mark.slow)])
+def test_a_body_may_lie_across_a_periodic_face(simulate, shape):
+    """It does what it does amid the domain, and the water around it as well."""
+    states = []
+    for middle in (0.5, 0.0):
+        motion = rts.ConstantMotion(velocity=(1.0, 0.3), angular_velocity=8.0)
+        disc = rts.SphereObstacle((middle, 0.4), 0.12, motion=motion)
+        bar = rts.BoxObstacle((middle - 0.2, 0.35), (middle + 0.2, 0.45), motion=motion)
+        scene = rts.Scene(
+            UNIT,
+            (rts.Block((0, 0), (1, 0.8)),),
+            0.05,
+            periodic=("x",),
+            kinematic_viscosity=0.02,
+            sound_speed=40.0,
+            obstacles=(disc if shape == "disc" else bar,),
+        )
+        sim = simulate(scene, rts.Uniform())
+        sim.advance_to(0.05)
+        x, v = sim.positions(), sim.velocities()
+        x[:, 0] = (x[:, 0] - middle) % 1.0
+        order = np.lexsort((x[:, 0], x[:, 1]))
+        states.append((x[order], v[order], sim.obstacle_forces().torques))
+    (x, v, torque), (x_too, v_too, torque_too) = states
+    assert np.linalg.norm(v, axis=1).max() > 0.5
+    np.testing.assert_allclose(x_too, x, atol=1e-9)
+    np.testing.assert_allclose(v_too, v, atol=1e-7)
+    np.testing.assert_allclose(torque_too, torque, rtol=1e-7)
 
 
 def ring_of_water(spacing, rate, density):
