@@ -6,9 +6,9 @@ import numpy as np
 
 from taichi_rts.errors import SceneError
 from taichi_rts.scene.geometry.drowned import is_drowned
-from taichi_rts.scene.obstacles.making import make_solid
 from taichi_rts.scene.obstacles.shape import ObstacleShape
 from taichi_rts.scene.obstacles.solid import Solid
+from taichi_rts.scene.obstacles.spanning import scene_solid, spans
 from taichi_rts.scene.parts.conditions import AXES
 from taichi_rts.scene.scales import SceneScales
 
@@ -24,7 +24,7 @@ def obstacle_faults(scene: SceneScales) -> list[str]:
         found = [f"obstacles.{k}: {fault}" for fault in _dimension_faults(scene, obstacle)]
         if not found:
             try:
-                solid = make_solid(obstacle, scene.spacing, scene.domain)
+                solid = scene_solid(scene, obstacle)
             except SceneError as error:
                 found = [f"obstacles.{k}: {error}"]
             else:
@@ -88,12 +88,13 @@ def _image_faults(scene: SceneScales, obstacle: ObstacleShape, solid: Solid) -> 
     reach = np.maximum(np.abs(solid.lower - pivot), np.abs(solid.upper - pivot))
     if motion.pieces(scene.dim).spins.any():
         reach[:] = np.linalg.norm(reach)
+    around = np.array(scene.is_periodic) & ~spans(scene, obstacle)
     limits = 0.5 * np.array(scene.domain.size) - scene.support
     return [
         f"{obstacle.shape} reaches {reach[d]:g} m from its pivot along the periodic axis {AXES[d]!r}, more than {limits[d]:g}, "
         "half the domain's length less a support radius; put motion.pivot in its middle, make it smaller, or enlarge the domain"
         for d in range(scene.dim)
-        if scene.is_periodic[d] and reach[d] > limits[d] * (1 + 1e-9)
+        if around[d] and reach[d] > limits[d] * (1 + 1e-9)
     ]
 
 

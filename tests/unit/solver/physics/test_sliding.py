@@ -15,6 +15,16 @@ def lid_driven(spacing, nu, **more):
     return rts.Scene(UNIT, (rts.Block((0, 0), (1, 1)),), spacing, kinematic_viscosity=nu, moving_walls=(lid,), **more)
 
 
+def test_couette_flow_under_a_box_that_spans_the_periodic_axis(simulate):
+    box = rts.BoxObstacle((0, 1), (1, 1.2), motion=rts.ConstantMotion(velocity=(1.0, 0.0)))
+    medium = VISCOUS | {"kinematic_viscosity": 0.1, "periodic": ("x",), "obstacles": (box,)}
+    sim = simulate(rts.Scene(rts.Box((0, 0), (1, 1.2)), (rts.Block((0, 0), (1, 1)),), 0.1, **medium), rts.Uniform())
+    sim.advance_to(8.0)  # eight times around
+    x, v = sim.positions(), sim.velocities()
+    np.testing.assert_allclose(v[:, 0], x[:, 1], atol=0.01)  # u = y
+    assert sim.statistics["stopped_by_obstacles"] == 0
+
+
 def test_couette_flow_under_a_face_that_slides(simulate):
     sim = simulate(lid_driven(0.1, 0.1, periodic=("x",), **VISCOUS), rts.Uniform(), debug=True)
     sim.advance_to(7.0)
