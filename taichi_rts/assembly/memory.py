@@ -14,8 +14,8 @@ from taichi_rts.device.backend import Backend
 from taichi_rts.device.fields import Declared, within
 from taichi_rts.scene.checks.size import size_of
 from taichi_rts.scene.geometry.bodies import bodies
+from taichi_rts.scene.geometry.spanning import scene_solid
 from taichi_rts.scene.obstacles.solid import Solid, grid_nodes
-from taichi_rts.scene.obstacles.spanning import scene_solid
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.grid.windows import FluidWindows, WallWindows, entries, room

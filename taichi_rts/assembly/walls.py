@@ -7,8 +7,8 @@ from typing import Any
 from taichi_rts.device import backend as backends
 from taichi_rts.sampling.sampling import Sample
 from taichi_rts.scene.geometry.bodies import bodies
+from taichi_rts.scene.geometry.spanning import scene_solid
 from taichi_rts.scene.obstacles.solid import distance_grid
-from taichi_rts.scene.obstacles.spanning import scene_solid
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.geometry import Geometry
 from taichi_rts.solver.grid.grid import BlockGrid

@@ -14,8 +14,8 @@ from taichi_rts.sampling.walls import WallLayer, line_obstacles, line_walls
 from taichi_rts.scene.fluids.block import Block
 from taichi_rts.scene.fluids.particles import Particles
 from taichi_rts.scene.fluids.shape import FluidShape
+from taichi_rts.scene.geometry.spanning import scene_solid
 from taichi_rts.scene.obstacles.solid import Solid
-from taichi_rts.scene.obstacles.spanning import scene_solid
 from taichi_rts.scene.parts.conditions import Inflow
 from taichi_rts.scene.scene import Scene
 

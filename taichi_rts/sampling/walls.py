@@ -12,8 +12,8 @@ import numpy as np
 from taichi_rts.medium.smoothing import lattice_sum, make_kernel
 from taichi_rts.sampling.lining import line_solid, neighbours, shares
 from taichi_rts.scene.fluids.shape import lattice
+from taichi_rts.scene.geometry.spanning import scene_solid, spans
 from taichi_rts.scene.obstacles.solid import Solid
-from taichi_rts.scene.obstacles.spanning import scene_solid, spans
 from taichi_rts.scene.parts.conditions import AXES
 from taichi_rts.scene.scene import Scene
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from taichi_rts.errors import SceneError
 from taichi_rts.scene.geometry.drowned import is_drowned
+from taichi_rts.scene.geometry.spanning import scene_solid, spans
 from taichi_rts.scene.obstacles.shape import ObstacleShape
 from taichi_rts.scene.obstacles.solid import Solid
-from taichi_rts.scene.obstacles.spanning import scene_solid, spans
 from taichi_rts.scene.parts.conditions import AXES
 from taichi_rts.scene.scales import SceneScales
 

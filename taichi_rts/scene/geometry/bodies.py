@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_rts.scene.fields import SceneFields
+from taichi_rts.scene.geometry.spanning import scene_solid, spans
 from taichi_rts.scene.obstacles.motion import Pieces
 from taichi_rts.scene.obstacles.solid import Solid
-from taichi_rts.scene.obstacles.spanning import scene_solid, spans
 
 
 @dataclass(frozen=True)
