@@ -14,7 +14,7 @@ from taichi_rts.device.backend import Backend
 from taichi_rts.device.fields import Declared, within
 from taichi_rts.scene.checks.size import size_of
 from taichi_rts.scene.geometry.bodies import bodies
-from taichi_rts.scene.obstacles.making import make_solid
+from taichi_rts.scene.geometry.spanning import scene_solid
 from taichi_rts.scene.obstacles.solid import Solid, grid_nodes
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
@@ -78,7 +78,7 @@ def count(scene: Scene, stepper: Stepper, spacing: float | None = None) -> Count
     s, dim = spacing or scene.spacing, scene.dim
     size, support = size_of(scene, spacing), scene.support_ratio * s
     geometry = make_geometry(scene, stepper, support)
-    solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
+    solids = [scene_solid(scene, obstacle) for obstacle in scene.obstacles]
     lined = [_lining(scene, solid, s) for solid in solids]
     moving = bodies(scene)
     resting = sum(lined) - sum(lined[body.number] for body in moving)
@@ -205,7 +205,7 @@ def buffer_bytes(
 def host_bytes(scene: Scene, *, spacing: float | None = None) -> float:
     """Largest number of bytes that sampling takes on the host; the arrays of a frame need less."""
     size, s = size_of(scene, spacing), spacing or scene.spacing
-    solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
+    solids = [scene_solid(scene, obstacle) for obstacle in scene.obstacles]
     nodes = [math.prod(map(float, grid_nodes(solid.lower, solid.upper, s)[1])) for solid in solids]
     lining = sum(_lining(scene, solid, s) for solid in solids) * scene.dim * LINING
     return (size.particles + size.walls) * scene.dim * SAMPLING + lining + max(nodes, default=0.0) * TABULATING

@@ -7,7 +7,7 @@ from typing import Any
 from taichi_rts.device import backend as backends
 from taichi_rts.sampling.sampling import Sample
 from taichi_rts.scene.geometry.bodies import bodies
-from taichi_rts.scene.obstacles.making import make_solid
+from taichi_rts.scene.geometry.spanning import scene_solid
 from taichi_rts.scene.obstacles.solid import distance_grid
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.geometry import Geometry
@@ -42,7 +42,7 @@ def make_keepers(scene: Scene, geometry: Geometry) -> list[Any]:
     """Return what keeps centres out of obstacles: one part for all that are at rest, one for each that moves."""
     if not scene.obstacles:
         return []
-    solids = (make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles)
+    solids = (scene_solid(scene, obstacle) for obstacle in scene.obstacles)
     grids = [distance_grid(solid, scene.spacing) for solid in solids]
     tables = DistanceTables(grids, scene.dim)
     at_rest = [k for k, obstacle in enumerate(scene.obstacles) if obstacle.motion is None]

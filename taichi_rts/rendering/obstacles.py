@@ -19,6 +19,7 @@ class ObstaclePoints:
     def __init__(self, scene: Scene, radius: float) -> None:
         self.moving = {body.number: body for body in bodies(scene)}
         self.points = []
+        self.low = scene.domain.lower
         for k, obstacle in enumerate(scene.obstacles):
             points = _spheres(make_solid(obstacle, scene.spacing), radius)
             if k not in self.moving:
@@ -30,11 +31,17 @@ class ObstaclePoints:
         """Positions `x` [m], (N, dim), and colours, (N, 3), of the fluid, with the obstacles' at `time` [s] behind them."""
         if not self.points:
             return x, tints
-        placed = [
-            self.moving[k].place(points, time) if k in self.moving else points for k, points in enumerate(self.points)
-        ]
+        placed = [self.carry(k, points, time) if k in self.moving else points for k, points in enumerate(self.points)]
         solid = np.concatenate(placed)
         return np.concatenate([x, solid]), np.concatenate([tints, np.tile(COLOUR, (len(solid), 1))])
+
+    def carry(self, k: int, points: np.ndarray, time: float) -> np.ndarray:
+        """Return where moving obstacle `k` has its `points` [m], (M, dim), at `time` [s]: along periodic axes in the domain."""
+        x = self.moving[k].place(points, time)
+        for d, length in enumerate(self.moving[k].periods):
+            if length:
+                x[:, d] -= length * np.floor((x[:, d] - self.low[d]) / length)
+        return x
 
 
 def _spheres(solid: Solid, radius: float) -> np.ndarray:

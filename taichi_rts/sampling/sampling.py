@@ -14,7 +14,7 @@ from taichi_rts.sampling.walls import WallLayer, line_obstacles, line_walls
 from taichi_rts.scene.fluids.block import Block
 from taichi_rts.scene.fluids.particles import Particles
 from taichi_rts.scene.fluids.shape import FluidShape
-from taichi_rts.scene.obstacles.making import make_solid
+from taichi_rts.scene.geometry.spanning import scene_solid
 from taichi_rts.scene.obstacles.solid import Solid
 from taichi_rts.scene.parts.conditions import Inflow
 from taichi_rts.scene.scene import Scene
@@ -42,7 +42,7 @@ class Sample:
 
 def sample(scene: Scene) -> Sample:
     """Fill the scene's fluids with a lattice, but not where obstacles are, and line its walls and obstacles."""
-    solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
+    solids = [scene_solid(scene, obstacle) for obstacle in scene.obstacles]
     positions = fluid_positions(scene, solids)
     moving = [fluid.velocities_at(x) for fluid, x in zip(scene.fluids, positions, strict=True)]
     pressed = [compress(scene, fluid, x) for fluid, x in zip(scene.fluids, positions, strict=True)]
@@ -62,7 +62,7 @@ def sample(scene: Scene) -> Sample:
 def fluid_positions(scene: Scene, solids: Sequence[Solid] | None = None) -> list[np.ndarray]:
     """Positions [m], (N, dim) each, of the lattice of every fluid; `solids` are those of the scene's obstacles."""
     if solids is None:
-        solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
+        solids = [scene_solid(scene, obstacle) for obstacle in scene.obstacles]
     return [keep_outside(scene, solids, fluid.fill(scene.spacing, scene.domain)) for fluid in scene.fluids]
 
 
@@ -106,8 +106,15 @@ def calibrate_mass(scene: Scene) -> float:
 
 def keep_outside(scene: Scene, solids: Sequence[Solid], x: np.ndarray) -> np.ndarray:
     """Leave out of `x` [m], (N, dim), what lies in an obstacle or nearer to it than half a spacing, as at the walls."""
+    low, high = np.array(scene.domain.lower), np.array(scene.domain.upper)
+    around = np.array(scene.is_periodic)
     for solid in solids:
-        near = np.asarray(((x > solid.lower - scene.spacing) & (x < solid.upper + scene.spacing)).all(axis=1))
-        near[near] = solid.distance(x[near]) < (0.5 - 1e-3) * scene.spacing
+        y = x
+        crossed = around & ((solid.lower < low) | (solid.upper > high))
+        if crossed.any():  # a moving body: what lies nearest to it of the images of x
+            lengths = np.where(crossed, high - low, 1.0)
+            y = x - crossed * lengths * np.round((x - solid.middle) / lengths)
+        near = np.asarray(((y > solid.lower - scene.spacing) & (y < solid.upper + scene.spacing)).all(axis=1))
+        near[near] = solid.distance(y[near]) < (0.5 - 1e-3) * scene.spacing
         x = x[~near]
     return x

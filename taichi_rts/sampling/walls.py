@@ -12,6 +12,7 @@ import numpy as np
 from taichi_rts.medium.smoothing import lattice_sum, make_kernel
 from taichi_rts.sampling.lining import line_solid, neighbours, shares
 from taichi_rts.scene.fluids.shape import lattice
+from taichi_rts.scene.geometry.spanning import scene_solid, spans
 from taichi_rts.scene.obstacles.solid import Solid
 from taichi_rts.scene.parts.conditions import AXES
 from taichi_rts.scene.scene import Scene
@@ -129,6 +130,9 @@ def line_obstacles(scene: Scene, solids: Sequence[Solid]) -> tuple[WallLayer, ..
     at_rest = [obstacle.motion is None for obstacle in scene.obstacles]
     layers = []
     for k, solid in enumerate(solids):
+        around = spans(scene, scene.obstacles[k])
+        if around.any():  # so long that its lattice goes on from one end of the domain to the other
+            solid = scene_solid(scene, scene.obstacles[k], depth + 3.5 * s)
         laid = [line_solid(solid, depth, s)]
         laid += [line_solid(solid, deep, s, least=deep - 0.2 * s) for deep in plane_depths(scene, depth)[1:]]
         x, normals = (np.concatenate(parts) for parts in zip(*laid, strict=True))
@@ -149,6 +153,9 @@ def line_obstacles(scene: Scene, solids: Sequence[Solid]) -> tuple[WallLayer, ..
                 if its and (other.lower < high).all() and (other.upper > low).all():
                     kept &= other.distance(x) > -0.99 * depth
             layer = layer.choose(kept)
+        if around.any():
+            inside = (x >= np.array(scene.domain.lower)) & (x < np.array(scene.domain.upper))
+            layer = layer.choose((inside | ~around).all(axis=1))
         layers.append(layer)
     return tuple(layers)
 

@@ -182,6 +182,36 @@ SCENES = [
         "no wall 'z+'",
     ),
     scene(
+        "a face that moves by nothing",
+        with_parts(TANK, moving_walls=[{"face": "x+"}]),
+        "moves nothing; give times [s] and displacements [m], or velocity [m/s]",
+    ),
+    scene(
+        "a face that slides out of its plane",
+        with_parts(TANK, kinematic_viscosity=0.1, moving_walls=[{"face": "x+", "velocity": [0.1, 1.0]}]),
+        "velocity (0.1, 1.0) leads across face 'x+'",
+    ),
+    scene(
+        "a face that slides without friction",
+        with_parts(TANK, moving_walls=[{"face": "x+", "velocity": [0.0, 1.0]}]),
+        "moving_walls.0: face 'x+' slides by friction alone, and kinematic_viscosity is 0",
+    ),
+    scene(
+        "a face that slides in another dimension",
+        with_parts(TANK, kinematic_viscosity=0.1, moving_walls=[{"face": "x+", "velocity": [0.0, 1.0, 0.0]}]),
+        "moving_walls.0: velocity has 3 components; the domain has 2",
+    ),
+    scene(
+        "a moving body that meets its own image",
+        with_parts(
+            TANK,
+            periodic=["x"],
+            obstacles=[{"shape": "box", "lower": [0.1, 0.2], "upper": [0.9, 0.4], "motion": {"velocity": [1.0, 0.0]}}],
+        ),
+        "from its pivot along the periodic axis 'x'",
+        "half the domain's length less a support radius",
+    ),
+    scene(
         "a periodic axis that does not exist",
         with_parts(TANK, periodic=["z"]),
         "periodic: axis 'z' does not exist in two dimensions",

@@ -140,6 +140,15 @@ def _condition_faults(scene: SceneScales) -> list[str]:
         axis = face_axis(wall.face)
         if axis >= scene.dim or scene.is_periodic[axis] or not scene.walls:
             faults.append(f"moving_walls.{k}: the domain has no wall {wall.face!r}; choose another face")
+        elif wall.velocity is not None and len(wall.velocity) != scene.dim:
+            faults.append(
+                f"moving_walls.{k}: velocity has {len(wall.velocity)} components; the domain has {scene.dim}, give as many"
+            )
+        elif any(wall.velocity or ()) and max(scene.viscosities) == 0.0:
+            faults.append(
+                f"moving_walls.{k}: face {wall.face!r} slides by friction alone, and kinematic_viscosity is 0; "
+                "give one above 0 [m^2/s], or leave velocity out"
+            )
         elif max(map(abs, wall.displacements)) > scene.domain.size[axis] - scene.support:
             faults.append(
                 f"moving_walls.{k}: {wall.face!r} would close the domain; leave at least {scene.support:g} [m]"

@@ -6,9 +6,10 @@ import numpy as np
 
 from taichi_rts.errors import SceneError
 from taichi_rts.scene.geometry.drowned import is_drowned
-from taichi_rts.scene.obstacles.making import make_solid
+from taichi_rts.scene.geometry.spanning import scene_solid, spans
 from taichi_rts.scene.obstacles.shape import ObstacleShape
 from taichi_rts.scene.obstacles.solid import Solid
+from taichi_rts.scene.parts.conditions import AXES
 from taichi_rts.scene.scales import SceneScales
 
 FAR_LARGER = 20.0
@@ -23,7 +24,7 @@ def obstacle_faults(scene: SceneScales) -> list[str]:
         found = [f"obstacles.{k}: {fault}" for fault in _dimension_faults(scene, obstacle)]
         if not found:
             try:
-                solid = make_solid(obstacle, scene.spacing, scene.domain)
+                solid = scene_solid(scene, obstacle)
             except SceneError as error:
                 found = [f"obstacles.{k}: {error}"]
             else:
@@ -71,9 +72,30 @@ def _place_faults(scene: SceneScales, obstacle: ObstacleShape, solid: Solid) -> 
     if (solid.upper <= low).any() or (solid.lower >= high).any():
         return [f"{where} lies outside the domain from {_text(low)} to {_text(high)}; move it inside"]
     around = np.array(scene.is_periodic)
+    if obstacle.motion is not None:
+        return _image_faults(scene, obstacle, solid)
     if ((solid.lower < low) | (solid.upper > high))[around].any():
         return [f"{where} crosses a periodic face of the domain; move it inside"]
     return []
+
+
+def _image_faults(scene: SceneScales, obstacle: ObstacleShape, solid: Solid) -> list[str]:
+    """Find a moving body so long that fluid would meet two of its images along a periodic axis: it knows the nearest alone."""
+    motion = obstacle.motion
+    if motion is None or not any(scene.is_periodic):
+        return []
+    pivot = solid.middle if motion.pivot is None else np.array(motion.pivot)
+    reach = np.maximum(np.abs(solid.lower - pivot), np.abs(solid.upper - pivot))
+    if motion.pieces(scene.dim).spins.any():
+        reach[:] = np.linalg.norm(reach)
+    around = np.array(scene.is_periodic) & ~spans(scene, obstacle)
+    limits = 0.5 * np.array(scene.domain.size) - scene.support
+    return [
+        f"{obstacle.shape} reaches {reach[d]:g} m from its pivot along the periodic axis {AXES[d]!r}, more than {limits[d]:g}, "
+        "half the domain's length less a support radius; put motion.pivot in its middle, make it smaller, or enlarge the domain"
+        for d in range(scene.dim)
+        if around[d] and reach[d] > limits[d] * (1 + 1e-9)
+    ]
 
 
 def _drowned_faults(scene: SceneScales, solids: list[tuple[int, Solid]]) -> list[str]:

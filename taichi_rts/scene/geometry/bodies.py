@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_rts.scene.fields import SceneFields
-from taichi_rts.scene.obstacles.making import make_solid
+from taichi_rts.scene.geometry.spanning import scene_solid, spans
 from taichi_rts.scene.obstacles.motion import Pieces
 from taichi_rts.scene.obstacles.solid import Solid
 
@@ -17,7 +17,8 @@ class Body:
     """A moving obstacle, number `number` of its scene, with its geometry at time 0 and its motion.
 
     `pivot` [m], (dim,), is where the pivot is before it moves, `radius` [m] how far the body reaches from there; `periods` [m],
-    (dim,), are the domain's lengths along periodic axes, 0 along others.
+    (dim,), are the domain's lengths along periodic axes, 0 along others; `spans`, (dim,), flags those that it goes all the way
+    round: there its pivot is in the domain's middle.
     """
 
     number: int
@@ -26,6 +27,7 @@ class Body:
     pivot: np.ndarray
     radius: float
     periods: tuple[float, ...]
+    spans: tuple[bool, ...]
 
     @property
     def speeds(self) -> np.ndarray:
@@ -56,9 +58,13 @@ def bodies(scene: SceneFields) -> list[Body]:
     for number, obstacle in enumerate(scene.obstacles):
         if obstacle.motion is None:
             continue
-        solid = make_solid(obstacle, scene.spacing, scene.domain)
+        solid = scene_solid(scene, obstacle)
         pivot = solid.middle if obstacle.motion.pivot is None else np.array(obstacle.motion.pivot)
+        around = spans(scene, obstacle)
+        pivot = np.where(around, solid.middle, pivot)
         corners = np.stack([solid.lower - pivot, solid.upper - pivot])
         radius = float(np.linalg.norm(np.abs(corners).max(axis=0)))
-        found.append(Body(number, solid, obstacle.motion.pieces(scene.dim), pivot, radius, periods))
+        found.append(
+            Body(number, solid, obstacle.motion.pieces(scene.dim), pivot, radius, periods, tuple(around.tolist()))
+        )
     return found

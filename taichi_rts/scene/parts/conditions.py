@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 import numpy as np
@@ -45,22 +46,30 @@ class GravityChange:
 @validated(SceneError)
 @dataclass(frozen=True, config=FROZEN)
 class MovingWall:
-    """A face of the domain that moves along its normal: a piston.
+    """A face of the domain that moves along its normal, as a piston, or slides along itself, as a lid or a belt.
 
     Attributes:
         face: "x-", "x+", "y-" and so on.
-        times: [s], (K,), ascending.
+        times: [s], (K,), ascending; none: it stays in its plane.
         displacements: of the face along its axis [m], (K,), piecewise linear in time; 0 before the first time, which the
             first displacement must be, and constant after the last. It never leaves the domain, so it is never negative
             for "x-" and never positive for "x+".
+        velocity: of the face along itself [m/s], (dim,), all the time; 0 across it. Fluid follows by friction alone, so it takes
+            a `kinematic_viscosity`. None: it does not slide.
     """
 
     face: Face
-    times: Annotated[tuple[NotNegative, ...], Len(2)]
-    displacements: Annotated[tuple[Number, ...], Len(2)]
+    times: Annotated[tuple[NotNegative, ...], Len(2)] = ()
+    displacements: Annotated[tuple[Number, ...], Len(2)] = ()
+    velocity: Vector | None = None
 
     @model_validator(mode="after")
     def _check(self) -> MovingWall:
+        if not self.times and not self.displacements:
+            if self.velocity is None:
+                raise ValueError("moves nothing; give times [s] and displacements [m], or velocity [m/s]")
+            object.__setattr__(self, "times", (0.0, 1.0))
+            object.__setattr__(self, "displacements", (0.0, 0.0))
         inward = 1.0 if self.face[1] == "-" else -1.0
         if len(self.times) != len(self.displacements):
             raise ValueError(
@@ -76,6 +85,12 @@ class MovingWall:
             raise ValueError(
                 f"displacements {self.displacements} take face {self.face!r} out of the domain; enlarge the domain"
             )
+        axis = face_axis(self.face)
+        if self.velocity is not None and axis < len(self.velocity) and self.velocity[axis] != 0.0:
+            raise ValueError(
+                f"velocity {self.velocity} leads across face {self.face!r}, and must be 0 along {AXES[axis]}, as the face slides "
+                "along itself; move it along its normal with times and displacements"
+            )
         return self
 
     @property
@@ -86,7 +101,7 @@ class MovingWall:
     @property
     def top_speed(self) -> float:
         """Largest speed [m/s]."""
-        return max(map(abs, self.velocities))
+        return math.hypot(max(map(abs, self.velocities)), *(self.velocity or ()))
 
     def displacement(self, time: float) -> float:
         """Displacement [m] at `time` [s]."""

@@ -125,8 +125,11 @@ class MomentumEquation:
         sideways = [term for term in viscosities if term.along == "v"]
 
         @ti.func
-        def rates(pushed, along_x, along_v, spread, x_ij, v_ij, d2, rho):
-            """Rates per unit of mass from the coefficients of pressure, viscosities and diffusion; `rho` is rho_i + rho_j."""
+        def rates(pushed, along_x, along_v, spread, x_ij, v_ij, slip, d2, rho):
+            """Rates per unit of mass from the coefficients of pressure, viscosities and diffusion; `rho` is rho_i + rho_j.
+
+            Viscosities along v act along `slip`, against fluid v_ij.
+            """
             d = ti.sqrt(d2 + tiny)
             thick, factor = 1.0, 0.0
             if ti.static(len(viscosities) > 0):
@@ -138,7 +141,7 @@ class MomentumEquation:
             for e in ti.static(range(dim)):
                 result[e] = factor * (thick * pushed + along_x) * x_ij[e]
                 if ti.static(len(sideways) > 0):
-                    result[e] += factor * along_v * v_ij[e]
+                    result[e] += factor * along_v * slip[e]
             if ti.static(width > dim):
                 result[dim] = factor * thick * v_ij.dot(x_ij)
             if ti.static(diffuses):
@@ -157,7 +160,7 @@ class MomentumEquation:
             if ti.static(diffuses):
                 spread = diffusion.fluid_pair(near, i, j, x_ij, d2)
             pushed = pressure.fluid_pair(near, i, j, x_ij, v_ij, d2)
-            total = mass * rates(pushed, along_x, along_v, spread, x_ij, v_ij, d2, near.rho[i] + near.rho[j])
+            total = mass * rates(pushed, along_x, along_v, spread, x_ij, v_ij, v_ij, d2, near.rho[i] + near.rho[j])
             if ti.static(len(own.pairs) > 0):
                 drawn = pairs.fluid_pair(near, i, j, x_ij, v_ij, d2)
                 for e in ti.static(range(dim)):
@@ -172,12 +175,14 @@ class MomentumEquation:
             along_x, along_v = 0.0, 0.0
             for term in ti.static(straight):
                 along_x += term.wall_pair(i, b, x_ib, v_ib, d2, wall)
+            slip = v_ib
+            if ti.static(len(sideways) > 0):
+                slip = wall.slip(i, b, x_ib, v_ib)
             for term in ti.static(sideways):
                 along_v += term.wall_pair(i, b, x_ib, v_ib, d2, wall)
             pushed = pressure.wall_pair(i, b, x_ib, v_ib, d2, wall)
-            total = (
-                rest_density * wall.volume[b] * rates(pushed, along_x, along_v, 0.0, x_ib, v_ib, d2, 2.0 * near.rho[i])
-            )
+            found = rates(pushed, along_x, along_v, 0.0, x_ib, v_ib, slip, d2, 2.0 * near.rho[i])
+            total = rest_density * wall.volume[b] * found
             if ti.static(len(own.pairs) > 0):
                 drawn = pairs.wall_pair(i, b, x_ib, v_ib, d2, wall)
                 for e in ti.static(range(dim)):
@@ -194,10 +199,19 @@ class MomentumEquation:
         def power_pair(wall: Any) -> Any:
             @ti.func
             def pair(i, b):
-                pushed, v_b = push(i, b, wall), near.v[i] - wall.relative_velocity(i, b)
+                pushed, v_ib = push(i, b, wall), wall.relative_velocity(i, b)
+                v_b = near.v[i] - v_ib
                 power = 0.0
                 for e in ti.static(range(dim)):
                     power += pushed[e] * v_b[e]
+                if ti.static(len(sideways) > 0):  # friction works with the velocity of the face
+                    x_ib, along_v = wall.difference(i, b), 0.0
+                    d2, slip = x_ib.norm_sqr(), wall.slip(i, b, x_ib, v_ib)
+                    for term in ti.static(sideways):
+                        along_v += term.wall_pair(i, b, x_ib, v_ib, d2, wall)
+                    drag = rates(0.0, 0.0, along_v, 0.0, x_ib, v_ib, slip, d2, 2.0 * near.rho[i])
+                    for e in ti.static(range(dim)):
+                        power += rest_density * wall.volume[b] * drag[e] * (v_ib[e] - slip[e])
                 return ti.Vector([power])
 
             return pair

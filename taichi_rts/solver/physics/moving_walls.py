@@ -1,4 +1,4 @@
-"""Faces of the domain that move as the scene prescribes: pistons."""
+"""Faces of the domain that move as the scene prescribes: pistons, and lids that slide along themselves."""
 
 import numpy as np
 
@@ -16,7 +16,8 @@ from taichi_rts.solver.physics.walls import Walls
 class MovingFace(Walls):
     """Wall particles that move together, sorted once in their own frame; fluid is brought into that frame at its own time.
 
-    So readers at different times see the wall each at its own, and nothing has to be sorted again.
+    So readers at different times see the wall each at its own, and nothing has to be sorted again. Those of a face that slides
+    along itself stay where they are, as it is even: only friction sees how fast it is.
     """
 
     moves = True
@@ -33,6 +34,7 @@ class MovingFace(Walls):
         self.axis = face_axis(description.face)
         self.at_lower = description.face[1] == "-"
         self.face = (geometry.lower if self.at_lower else geometry.upper)[self.axis]
+        self.slides = tuple(description.velocity or ())
         times, displacements, velocities = description.times, description.displacements, description.velocities
         self.make_fields(self.place_fields(fluid.count), backend.dtype)
         self.table = Timetable(times, [*np.diff(times), 1e30])  # the last piece is the rest after the end
@@ -81,6 +83,14 @@ class MovingFace(Walls):
         """v_k - v_b [m/s]."""
         v = self.fluid.v[k]
         v[self.axis] -= self.speed[k]
+        return v
+
+    @ti.func
+    def slip(self, k, b, x_ib, v_ib):
+        """Velocity [m/s] of the fluid at place `k` past the face, which may slide."""
+        v = v_ib
+        for d in ti.static(range(len(self.slides))):
+            v[d] -= self.slides[d]
         return v
 
     @ti.func

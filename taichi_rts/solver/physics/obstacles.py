@@ -30,6 +30,10 @@ class MovingBody(Walls):
     ) -> None:
         arms = replace(layer, positions=layer.positions - body.pivot)
         around = self.own_geometry(arms.positions.min(axis=0), arms.positions.max(axis=0), support)
+        if any(body.spans):  # and goes on from one end of the domain to the other
+            periods = np.array(body.periods)
+            lower, upper = np.where(body.spans, [-0.5 * periods, 0.5 * periods], [around.lower, around.upper])
+            around = Geometry(lower.tolist(), upper.tolist(), support, 0.0, body.spans)
         super().__init__(arms, fluid, around, backend)
         self.grid = grid
         self.domain = grid.geometry
@@ -70,13 +74,26 @@ class MovingBody(Walls):
     def difference(self, k, b):
         """x_k - x_b [m], as the world sees it, between the due particle at place `k` and wall particle `b`."""
         n = self.block(k)
-        return self.domain.difference(self.fluid.x[k], self.pivot[n]) - self.turn[n] @ self.x[b]
+        x_kb = self.domain.difference(self.fluid.x[k], self.pivot[n]) - self.turn[n] @ self.x[b]
+        if ti.static(self.geometry.repeats):  # it does not turn
+            x_kb = self.geometry.difference(x_kb, ti.zero(x_kb))
+        return x_kb
 
     @ti.func
     def relative_velocity(self, k, b):
         """v_k - v_b [m/s]."""
         n = self.block(k)
         return self.fluid.v[k] - self.velocity[n] - self.path.carried(self.spin[n], self.turn[n] @ self.x[b])
+
+    @ti.func
+    def slip(self, k, b, x_ib, v_ib):
+        """Velocity [m/s] of the fluid at place `k` past the face, where the line to particle `b` crosses it.
+
+        There a turning body is as fast as fluid that rests on it. Its particles lie deeper, and so have another speed: those of
+        a cup are faster than its inside.
+        """
+        share = 1.0 - 1.0 / (self.shear(k, b, x_ib) * self.stiffness)  # of the way from b to k that lies in the body
+        return v_ib - share * self.path.carried(self.spin[self.block(k)], x_ib)
 
     @ti.func
     def facing(self, k, b):

@@ -112,6 +112,11 @@ class Walls(Part):
         return self.normal[b]
 
     @ti.func
+    def slip(self, k, b, x_ib, v_ib):
+        """Velocity [m/s] of the fluid at place `k` past the wall's face, where the line to particle `b` crosses it."""
+        return v_ib
+
+    @ti.func
     def shear(self, k, b, x_ib):
         """How much faster than fluid at x_ib [m] from particle `b` that fluid moves past the wall's far side, per its speed.
 
