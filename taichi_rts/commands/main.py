@@ -1,4 +1,4 @@
-"""The command line: `taichi-rts run|compare|stability|bench|side-by-side|scenes|info`."""
+"""The command line: `taichi-rts run|compare|stability|bench|side-by-side|plot|scenes|info`."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from taichi_rts.commands import report
 from taichi_rts.commands.help import quiet
 from taichi_rts.commands.options import StepperOptions
 from taichi_rts.commands.plain_text import use_plain_text
+from taichi_rts.commands.plot import Plot
 from taichi_rts.commands.run import Run
 from taichi_rts.commands.scene_copies import copy_scene, example_names
 from taichi_rts.compare.command import Compare
@@ -60,7 +61,7 @@ class Info:
         report.print_info(backend.available())
 
 
-for each in (Run, Compare, Stability, Bench, SideBySide, Scenes):
+for each in (Run, Compare, Stability, Bench, SideBySide, Plot, Scenes):
     quiet(each)
 
 Command = (
@@ -69,6 +70,7 @@ Command = (
     | Annotated[Stability, tyro.conf.subcommand("stability")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[SideBySide, tyro.conf.subcommand("side-by-side")]
+    | Annotated[Plot, tyro.conf.subcommand("plot")]
     | Annotated[Scenes, tyro.conf.subcommand("scenes")]
     | Annotated[Info, tyro.conf.subcommand("info")]
 )

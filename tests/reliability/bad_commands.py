@@ -219,6 +219,9 @@ COMMANDS = [
         "did you mean 'piston'",
         "known",
     ),
+    command("plot: no run", ("plot",), "no run to draw"),
+    command("plot: no series", ("plot", "earlier"), "holds no series.csv"),
+    command("plot: unknown ending", ("plot", "earlier", "--output", "curves.jpg"), "curves.jpg", ".png, .pdf, .svg"),
     command(
         "stability: no such stepper",
         ("stability", "--steppers", "rk4", "--output-dir", "out"),

@@ -6,7 +6,7 @@ import tyro
 from taichi_rts.commands.main import Command
 
 
-@pytest.mark.parametrize("command", ["run", "compare", "stability", "bench", "side-by-side", "scenes"])
+@pytest.mark.parametrize("command", ["run", "compare", "stability", "bench", "side-by-side", "plot", "scenes"])
 def test_help_does_not_mention_none(command, capsys):
     with pytest.raises(SystemExit):
         tyro.cli(Command, args=[command, "--help"])
