@@ -129,7 +129,9 @@ def test_scene_files_hold(page, folder, monkeypatch):
     for block in blocks(page):
         if block.language == "toml" and not block.file:
             part = tomllib.loads(block.text)
-            flat = "inflows" in part
+            flat = "inflows" in part or any(
+                len(wall.get("velocity", "xyz")) == 2 for wall in part.get("moving_walls", ())
+            )
             dummy = {key: flattened(value) if flat else value for key, value in DUMMY.items()}
             shutil.copy(ROOT / "assets/obstacles/ball.obj", folder / "ball.obj")
             part["obstacles"] = [
