@@ -17,6 +17,7 @@ from taichi_rts.scene.fluids.shape import FluidShape
 from taichi_rts.scene.obstacles.making import make_solid
 from taichi_rts.scene.obstacles.solid import Solid
 from taichi_rts.scene.parts.conditions import Inflow
+from taichi_rts.scene.rows import fit_rows
 from taichi_rts.scene.scene import Scene
 
 
@@ -42,10 +43,11 @@ class Sample:
 
 def sample(scene: Scene) -> Sample:
     """Fill the scene's fluids with a lattice, but not where obstacles are, and line its walls and obstacles."""
+    rows = fit_rows(scene)
     solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
-    positions = fluid_positions(scene, solids)
-    moving = [fluid.velocities_at(x) for fluid, x in zip(scene.fluids, positions, strict=True)]
-    pressed = [compress(scene, fluid, x) for fluid, x in zip(scene.fluids, positions, strict=True)]
+    positions = [keep_outside(scene, solids, fluid.fill(rows.steps, scene.domain)) for fluid in rows.fluids]
+    moving = [fluid.velocities_at(x) for fluid, x in zip(rows.fluids, positions, strict=True)]
+    pressed = [compress(scene, fluid, x) for fluid, x in zip(rows.fluids, positions, strict=True)]
     viscosities = [np.full(len(x), nu) for x, nu in zip(positions, scene.viscosities, strict=False)]
     return Sample(
         np.concatenate([x for x, _ in pressed]),
@@ -59,11 +61,11 @@ def sample(scene: Scene) -> Sample:
     )
 
 
-def fluid_positions(scene: Scene, solids: Sequence[Solid] | None = None) -> list[np.ndarray]:
-    """Positions [m], (N, dim) each, of the lattice of every fluid; `solids` are those of the scene's obstacles."""
-    if solids is None:
-        solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
-    return [keep_outside(scene, solids, fluid.fill(scene.spacing, scene.domain)) for fluid in scene.fluids]
+def fluid_positions(scene: Scene) -> list[np.ndarray]:
+    """Positions [m], (N, dim) each, of the lattice of every fluid."""
+    solids = [make_solid(obstacle, scene.spacing, scene.domain) for obstacle in scene.obstacles]
+    rows = fit_rows(scene)
+    return [keep_outside(scene, solids, fluid.fill(rows.steps, scene.domain)) for fluid in rows.fluids]
 
 
 def compress(scene: Scene, fluid: FluidShape, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -92,16 +94,16 @@ def fill_patch(scene: Scene, inflow: Inflow) -> np.ndarray:
     """Positions [m], (N, dim), of the layer of particles that an inflow lets in at once, on its patch."""
     half = 0.5 * scene.spacing * np.eye(scene.dim)[inflow.axis]
     lower, upper = np.asarray(inflow.lower) - half, np.asarray(inflow.upper) + half
-    return Block(tuple(lower), tuple(upper)).fill(scene.spacing, scene.domain)
+    return Block(tuple(lower), tuple(upper)).fill((scene.spacing,) * scene.dim, scene.domain)
 
 
 def calibrate_mass(scene: Scene) -> float:
-    """Particle mass [kg] that gives the infinite initial lattice its rest density: m = rho_0 / sum_j W_ij.
+    """Particle mass [kg] that gives the infinite initial lattice its rest density: m = rho_0 / sum_j W_ij, on `rows.fit_rows`.
 
     With m = rho_0 s^dim a Wendland lattice at r = 2s starts several percent too dense and explodes.
     """
     kernel = make_kernel(scene.kernel, scene.dim, scene.support)
-    return scene.rest_density / lattice_sum(kernel, scene.dim, scene.spacing)
+    return scene.rest_density / lattice_sum(kernel, fit_rows(scene).steps)
 
 
 def keep_outside(scene: Scene, solids: Sequence[Solid], x: np.ndarray) -> np.ndarray:

@@ -138,5 +138,5 @@ def test_the_list_of_scenes_counts_what_a_run_has(capsys, monkeypatch):
     report.print_scenes(scenes)
     out = capsys.readouterr().out
     assert "end [s]" in out
-    for scene, count in zip(scenes, (34_320, len(sample(scenes[1]).positions)), strict=True):
+    for scene, count in zip(scenes, (35_640, len(sample(scenes[1]).positions)), strict=True):
         assert f"{count:,}" in next(line for line in out.splitlines() if f" {scene.name} " in line)
