@@ -17,8 +17,12 @@ from taichi_rts.scene.fluids.shape import FluidShape
 from taichi_rts.scene.obstacles.making import make_solid
 from taichi_rts.scene.obstacles.solid import Solid
 from taichi_rts.scene.parts.conditions import Inflow
-from taichi_rts.scene.rows import fit_rows
+from taichi_rts.scene.rows import fit_rows, is_multiple
 from taichi_rts.scene.scene import Scene
+from taichi_rts.scene.validation import Vector
+
+WIDEST_ROWS = 1.25
+"""Largest distance [spacings] of rows on the patch of an inflow."""
 
 
 @dataclass(frozen=True)
@@ -91,10 +95,30 @@ def compress(scene: Scene, fluid: FluidShape, x: np.ndarray) -> tuple[np.ndarray
 
 
 def fill_patch(scene: Scene, inflow: Inflow) -> np.ndarray:
-    """Positions [m], (N, dim), of the layer of particles that an inflow lets in at once, on its patch."""
-    half = 0.5 * scene.spacing * np.eye(scene.dim)[inflow.axis]
+    """Positions [m], (N, dim), of the layer of particles that an inflow lets in at once, on its patch, in `patch_steps`."""
+    steps = np.array(patch_steps(scene, inflow))
+    half = 0.5 * steps[inflow.axis] * np.eye(scene.dim)[inflow.axis]
     lower, upper = np.asarray(inflow.lower) - half, np.asarray(inflow.upper) + half
-    return Block(tuple(lower), tuple(upper)).fill((scene.spacing,) * scene.dim, scene.domain)
+    return Block(tuple(lower), tuple(upper)).fill(tuple(steps.tolist()), scene.domain)
+
+
+def patch_steps(scene: Scene, inflow: Inflow) -> Vector:
+    """Distances [m], (dim,), of rows on an inflow's patch, and of its layers across it.
+
+    A whole number of rows fits into the patch, and layers follow each other such that a particle has the volume that those at the
+    start have: so area times speed flows in. Rows are no further apart than `WIDEST_ROWS`, where but one fits.
+    """
+    rows = fit_rows(scene)
+    steps = list(rows.steps)
+    sides = [d for d in range(scene.dim) if d != inflow.axis]
+    for d in sides:
+        length = inflow.upper[d] - inflow.lower[d]
+        if not is_multiple(length, steps[d]):
+            fitted = length / max(1, math.floor(length / scene.spacing + 0.5))
+            steps[d] = min(fitted, WIDEST_ROWS * scene.spacing)
+    if tuple(steps) != rows.steps:
+        steps[inflow.axis] = rows.cell / math.prod(steps[d] for d in sides)
+    return tuple(steps)
 
 
 def calibrate_mass(scene: Scene) -> float:
