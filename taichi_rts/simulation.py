@@ -172,6 +172,7 @@ class Simulation(Readers, Budget, Measured):
 
     def _advance(self, time: float) -> None:
         target = self.timeline.ticks_until(time)
+        backends.settle_threads()
         ti.sync()
         began = clock.perf_counter()
         stopped = False

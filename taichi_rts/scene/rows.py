@@ -23,6 +23,8 @@ MOST_FITTED = 0.05
 CLOSEST, WIDEST = 0.9, 1.25
 """Limits [spacings] of rows where fluid reaches from wall to wall, and would leave a gap otherwise: pools that are 2.5 to 20
 spacings wide rest with rows 0.92 to 1.25 apart, with 0.88 they lose pressure, with 1.33 they keep moving."""
+MOST_TRIED = 16
+"""Blocks, the largest, whose sides rows are tried to fit."""
 SLACK = 1e-6
 """Share of the spacing that counts as rounding of lengths."""
 
@@ -59,8 +61,8 @@ def fit_rows(scene: SceneScales, spacing: float | None = None) -> Rows:
         return Rows((spacing,) * scene.dim, scene.fluids)
     blocks: list[Any] = [scene.fluids[k] for k in lattice]
     steps, corners = [], [(list(block.lower), list(block.upper)) for block in blocks]
-    for axis in range(scene.dim):
-        fitted = _Axis(scene, spacing, axis, blocks)
+    for fitted in _axes(scene, spacing, blocks):
+        axis = fitted.axis
         steps.append(fitted.step)
         if not fitted.is_regular:
             for (lower, upper), (a, b) in zip(corners, fitted.faces(), strict=True):
@@ -70,6 +72,20 @@ def fit_rows(scene: SceneScales, spacing: float | None = None) -> Rows:
         if (tuple(lower), tuple(upper)) != (block.lower, block.upper):
             fluids[k] = replace(block, lower=tuple(lower), upper=tuple(upper))
     return Rows(tuple(steps), tuple(fluids))
+
+
+def cell_volume(scene: SceneScales, spacing: float) -> float:
+    """Volume [m^dim] of the lattice at each particle with another `spacing` [m], also of a scene that may contradict itself."""
+    fluids = scene.fluids
+    whole = all(len(fluid.lower) == scene.dim for fluid in fluids)
+    blocks = [fluid for fluid in fluids if isinstance(fluid, Block)]
+    if not whole or not blocks or any(isinstance(fluid, Particles) for fluid in fluids):
+        return spacing**scene.dim
+    return math.prod(axis.step for axis in _axes(scene, spacing, blocks))
+
+
+def _axes(scene: SceneScales, spacing: float, blocks: Sequence[Block]) -> list[_Axis]:
+    return [_Axis(scene, spacing, axis, blocks) for axis in range(scene.dim)]
 
 
 def is_multiple(length: float, step: float) -> bool:
@@ -101,8 +117,9 @@ class _Axis:
                 step = across / math.floor(across / s)
             return step if step <= WIDEST * s else s
         lengths = [b - a for a, b in self.sides]
-        even = [length / max(1, math.floor(length / s + 0.5)) for length in lengths]
-        choices = [s, *(min(max(step, (1.0 - MOST_FITTED) * s), (1.0 + MOST_FITTED) * s) for step in even)]
+        largest = sorted(range(len(lengths)), key=lambda k: -self.blocks[k].volume)[:MOST_TRIED]
+        even = {lengths[k] / max(1, math.floor(lengths[k] / s + 0.5)) for k in largest}
+        choices = [s, *(min(max(step, (1.0 - MOST_FITTED) * s), (1.0 + MOST_FITTED) * s) for step in sorted(even))]
         choices = [step for step in choices if step <= min(lengths) + self.slack]
 
         def lost(step: float) -> float:
