@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -41,7 +42,7 @@ class Filling:
         found = []
         if any(step != spacing for step in self.steps):
             found.append(("rows", f"{_by(self.steps)} m apart, so that they fit; particles' mass follows"))
-        found += [("size rounded", line) for line in self.rounded]
+        found += [("rounded", line) for line in self.rounded]
         if abs(self.gain) > NOTABLE:
             found.append(("volume", f"{self.filled:.4g} of {self.wanted:.4g} {unit} asked for ({self.gain:+.1%})"))
         return found
@@ -68,6 +69,8 @@ def _volume(scene: Scene, rows: Rows, fluid: Any) -> float:
     """Volume [m^dim] of the cells of a fluid's particles."""
     if isinstance(fluid, Particles):
         return fluid.volume_at(scene.spacing)
+    if isinstance(fluid, Block):
+        return math.prod(fluid.rows(rows.steps)) * rows.cell
     return len(fluid.fill(rows.steps, scene.domain)) * rows.cell
 
 
