@@ -116,12 +116,14 @@ class Simulation(Readers, Budget, Measured):
     def advance_to(self, time: float) -> None:
         """Run all steps up to physical `time` [s]; readers then predict to exactly that time.
 
-        The sequence of steps does not depend on the times asked for. Raises `TimeError` for a time in the past and
-        `SimulationDivergedError` when the state is no longer finite.
+        The sequence of steps does not depend on the times asked for. Raises `TimeError` for a time in the past, or later than
+        the scene's `end_time` where fluid flows in that long, for which memory is reserved; and `SimulationDivergedError` when
+        the state is no longer finite.
         A run that `stop_asked` interrupts keeps its `time`; the steps that it has done ahead of it are not done again.
         """
         if time < self._time:
             raise TimeError(f"time {time:g} s lies before the present {self._time:g} s; runs only go forward")
+        self._require_room(time)
         if self.scene.gravity_changes:
             self._advance_under_changes(time)
         self._advance(time)
@@ -136,6 +138,7 @@ class Simulation(Readers, Budget, Measured):
         time, and at `until`. Raises as `advance_to` does, as `check` at every frame, and `OutputError` for an impossible `fps`.
         """
         looks = [on_frame] if callable(on_frame) else on_frame or []
+        self._require_room(until)
         for time in frame_times(until, fps):
             if time > self._time or time == 0.0 == self._time:
                 with contextlib.suppress(SimulationDivergedError):  # `check` says more
@@ -153,6 +156,10 @@ class Simulation(Readers, Budget, Measured):
         """
         return Image.fromarray(Painter(self.scene, picture_options(**options)).paint(self))
 
+    def _require_room(self, time: float) -> None:
+        if self.inflows is not None:
+            self.inflows.require_room(time, slack=self.base_step * self.schedule.levels)
+
     def _advance_under_changes(self, time: float) -> None:
         """Run to the last reading before `time` [s] that the work of changes of gravity needs."""
         table, reach = self.scene.gravity_table, MOST_STEPS * self.base_step
@@ -165,6 +172,7 @@ class Simulation(Readers, Budget, Measured):
 
     def _advance(self, time: float) -> None:
         target = self.timeline.ticks_until(time)
+        backends.settle_threads()
         ti.sync()
         began = clock.perf_counter()
         stopped = False

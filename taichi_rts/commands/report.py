@@ -17,6 +17,7 @@ from taichi_rts.device.backend import Backend
 from taichi_rts.medium.energy import Energy
 from taichi_rts.readings.diagnosis import Diagnosis
 from taichi_rts.readings.levels import level_classes, milliseconds
+from taichi_rts.sampling.filling import filling
 from taichi_rts.sampling.sampling import fluid_positions
 from taichi_rts.scene.checks.size import size_of
 from taichi_rts.scene.scene import Scene
@@ -94,6 +95,8 @@ def print_table(
     drift = gain / abs(initial_energy.total) if initial_energy.total else 0.0
     facts = Table(show_header=False, box=None)
     facts.add_row("particles", f"{sim.count:,}, spacing {sim.scene.spacing:.4g} m")
+    for name, fact in filling(sim.scene).facts(sim.scene.spacing):
+        facts.add_row(name, fact)
     active, base_steps = statistics["active_fraction"], statistics["base_steps"]
     facts.add_row("active fraction", f"{active:.3f}")
     facts.add_row("base steps", f"{base_steps:,} in {statistics['wall_seconds']:.2f} s")

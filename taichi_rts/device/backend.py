@@ -19,6 +19,7 @@ import numpy as np
 
 from taichi_rts.device import forks, kernel_cache, ownership, source_cache
 from taichi_rts.device.ownership import Start, holds_fields, require_own_process
+from taichi_rts.device.pinning import Pinning, usage
 from taichi_rts.errors import BackendError
 from taichi_rts.importing import PROGRAM, runs_as_program
 
@@ -55,6 +56,7 @@ ownership.watch(ti)
 source_cache.remember(import_module(f"{FORK.module}.lang.ast.ast_transformer_utils"), ti.lang.kernel_impl)
 
 ARCHES = ("cuda", "vulkan", "cpu")  # the order in which `auto` tries them
+_POOL: list[Pinning] = []  # that of the present start, on a CPU
 PRECISIONS = {"f32": (ti.f32, np.float32), "f64": (ti.f64, np.float64)}
 _REMEDIES = {
     "cuda": "install an NVIDIA driver, or use --arch cpu",
@@ -257,14 +259,15 @@ def _start(name: str, precision: str, options: dict[str, Any]) -> bool:
         folder = os.path.join(folder, FORK.module)
     folder = str(options.get("offline_cache_file_path") or folder)
     settings["offline_cache_file_path"] = kernel_cache.usable_folder(folder)
-    others = _thread_ids()
+    others, before = _thread_ids(), usage()
     try:
         with contextlib.redirect_stdout(io.StringIO()):  # its banner would break progress bars and piped output
             ti.init(arch=getattr(ti, name), default_fp=PRECISIONS[precision][0], default_ip=ti.i32, **settings)
     except RuntimeError:
         return False
+    _POOL.clear()
     if name == "cpu":
-        pin_threads(sorted(_thread_ids() - others))
+        _POOL.append(Pinning(sorted(_thread_ids() - others), threads(), before))
     return True
 
 
@@ -276,20 +279,10 @@ def _thread_ids() -> set[int]:
         return set()
 
 
-def pin_threads(started: list[int]) -> None:
-    """Give every thread of Taichi's pool, the last of those that `ti.init` has `started`, a core of its own.
-
-    They sleep between loops, and Linux wakes them on the core that they were woken from: two threads then share one core for
-    milliseconds, longer than most kernels take (docs/evidence/speed.md). Only if there is a thread for every core that it may
-    use: fewer threads are for sharing the machine, and must be free to move. TAICHI_RTS_PIN=0 in the environment turns it off.
-    """
-    if not hasattr(os, "sched_setaffinity") or os.environ.get("TAICHI_RTS_PIN", "1") == "0":
-        return
-    cores = sorted(os.sched_getaffinity(0))
-    if len(cores) == threads() <= len(started):
-        for thread, core in zip(started[-len(cores) :], cores, strict=True):
-            with contextlib.suppress(OSError):  # a thread that has ended, or a sandbox that forbids it
-                os.sched_setaffinity(thread, {core})
+def settle_threads() -> None:
+    """Give the threads of Taichi's pool a core each, or let them go, by what other processes use (`pinning`)."""
+    if _POOL:
+        _POOL[0].look()
 
 
 def has_vulkan_hardware() -> bool:

@@ -5,6 +5,7 @@ gradient as a factor: grad W = factor * (x_i - x_j), factor = (dW/dq) / (h d).
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -96,9 +97,9 @@ def make_kernel(name: str, dim: int, support: float) -> Any:
     return KERNELS[name](dim, support)
 
 
-def lattice_sum(kernel: Any, dim: int, spacing: float) -> float:
-    """Sum of W [1/m^dim] over an infinite square or cubic lattice of `spacing` [m], seen from one of its points."""
-    reach = math.ceil(2.0 * kernel.h / spacing)
-    axis = spacing * np.arange(-reach, reach + 1)
-    distance2 = sum(grid**2 for grid in np.meshgrid(*[axis] * dim))
+def lattice_sum(kernel: Any, steps: Sequence[float]) -> float:
+    """Sum of W [1/m^dim] over an infinite lattice, seen from one of its points; `steps` [m], (dim,), are its rows' distances."""
+    reaches = [math.ceil(2.0 * kernel.h / step) for step in steps]
+    axes = [step * np.arange(-reach, reach + 1) for step, reach in zip(steps, reaches, strict=True)]
+    distance2 = sum(grid**2 for grid in np.meshgrid(*axes))
     return float(kernel.sample(np.sqrt(distance2)).sum())

@@ -17,6 +17,7 @@ from taichi_rts.particle_files.formats import FORMATS, require_format
 from taichi_rts.particle_files.frame import ParticleFrame
 from taichi_rts.particle_files.vtu import collection
 from taichi_rts.readings.reading import Readable, Reading
+from taichi_rts.scene.rows import fit_rows
 
 ATTRIBUTES: dict[str, Callable[[Reading], np.ndarray]] = {
     "id": lambda now: now.ids,
@@ -52,7 +53,7 @@ def capture(state: Readable, attributes: Sequence[str] = DEFAULT_ATTRIBUTES) -> 
     found = {name: ATTRIBUTES[name](now) for name in attributes}
     precision = now.velocities.dtype
     reals = {name: values.astype(precision, copy=False) for name, values in found.items() if values.dtype.kind == "f"}
-    return ParticleFrame(now.positions, found | reals, now.time, now.scene.spacing, now.origin)
+    return ParticleFrame(now.positions, found | reals, now.time, fit_rows(now.scene).spacing, now.origin)
 
 
 def write_particles(path: str | Path, frame: ParticleFrame) -> None:

@@ -34,6 +34,7 @@ from taichi_rts.output.turning import UpAxis, rotation_to
 from taichi_rts.readings.reading import Reading
 from taichi_rts.rendering import legend
 from taichi_rts.rendering.painter import Painter, PictureOptions, make_renderer
+from taichi_rts.sampling.filling import filling
 from taichi_rts.scene.scene import Scene
 from taichi_rts.simulation import Simulation
 from taichi_rts.solver.stepping.steppers import stepper_data
@@ -356,6 +357,7 @@ def describe_run(sim: Simulation, initial_energy: Any) -> dict[str, Any]:
         "precision": sim.backend.precision,
         "device": platform.processor() or platform.machine(),
         "particles": sim.count,
+        "filling": filling(sim.scene).to_dict(),
         "end_time": sim.time,
         "base_step": sim.base_step,
         "sound_speed": sim.medium.sound_speed,

@@ -17,7 +17,12 @@ from taichi_rts.scene.fluids.shape import FluidShape
 from taichi_rts.scene.geometry.spanning import scene_solid
 from taichi_rts.scene.obstacles.solid import Solid
 from taichi_rts.scene.parts.conditions import Inflow
+from taichi_rts.scene.rows import fit_rows, is_multiple
 from taichi_rts.scene.scene import Scene
+from taichi_rts.scene.validation import Vector
+
+WIDEST_ROWS = 1.25
+"""Largest distance [spacings] of rows on the patch of an inflow."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +47,11 @@ class Sample:
 
 def sample(scene: Scene) -> Sample:
     """Fill the scene's fluids with a lattice, but not where obstacles are, and line its walls and obstacles."""
+    rows = fit_rows(scene)
     solids = [scene_solid(scene, obstacle) for obstacle in scene.obstacles]
-    positions = fluid_positions(scene, solids)
-    moving = [fluid.velocities_at(x) for fluid, x in zip(scene.fluids, positions, strict=True)]
-    pressed = [compress(scene, fluid, x) for fluid, x in zip(scene.fluids, positions, strict=True)]
+    positions = [keep_outside(scene, solids, fluid.fill(rows.steps, scene.domain)) for fluid in rows.fluids]
+    moving = [fluid.velocities_at(x) for fluid, x in zip(rows.fluids, positions, strict=True)]
+    pressed = [compress(scene, fluid, x) for fluid, x in zip(rows.fluids, positions, strict=True)]
     viscosities = [np.full(len(x), nu) for x, nu in zip(positions, scene.viscosities, strict=False)]
     return Sample(
         np.concatenate([x for x, _ in pressed]),
@@ -59,11 +65,11 @@ def sample(scene: Scene) -> Sample:
     )
 
 
-def fluid_positions(scene: Scene, solids: Sequence[Solid] | None = None) -> list[np.ndarray]:
-    """Positions [m], (N, dim) each, of the lattice of every fluid; `solids` are those of the scene's obstacles."""
-    if solids is None:
-        solids = [scene_solid(scene, obstacle) for obstacle in scene.obstacles]
-    return [keep_outside(scene, solids, fluid.fill(scene.spacing, scene.domain)) for fluid in scene.fluids]
+def fluid_positions(scene: Scene) -> list[np.ndarray]:
+    """Positions [m], (N, dim) each, of the lattice of every fluid."""
+    solids = [scene_solid(scene, obstacle) for obstacle in scene.obstacles]
+    rows = fit_rows(scene)
+    return [keep_outside(scene, solids, fluid.fill(rows.steps, scene.domain)) for fluid in rows.fluids]
 
 
 def compress(scene: Scene, fluid: FluidShape, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -89,19 +95,39 @@ def compress(scene: Scene, fluid: FluidShape, x: np.ndarray) -> tuple[np.ndarray
 
 
 def fill_patch(scene: Scene, inflow: Inflow) -> np.ndarray:
-    """Positions [m], (N, dim), of the layer of particles that an inflow lets in at once, on its patch."""
-    half = 0.5 * scene.spacing * np.eye(scene.dim)[inflow.axis]
+    """Positions [m], (N, dim), of the layer of particles that an inflow lets in at once, on its patch, in `patch_steps`."""
+    steps = np.array(patch_steps(scene, inflow))
+    half = 0.5 * steps[inflow.axis] * np.eye(scene.dim)[inflow.axis]
     lower, upper = np.asarray(inflow.lower) - half, np.asarray(inflow.upper) + half
-    return Block(tuple(lower), tuple(upper)).fill(scene.spacing, scene.domain)
+    return Block(tuple(lower), tuple(upper)).fill(tuple(steps.tolist()), scene.domain)
+
+
+def patch_steps(scene: Scene, inflow: Inflow) -> Vector:
+    """Distances [m], (dim,), of rows on an inflow's patch, and of its layers across it.
+
+    A whole number of rows fits into the patch, and layers follow each other such that a particle has the volume that those at the
+    start have: so area times speed flows in. Rows are no further apart than `WIDEST_ROWS`, where but one fits.
+    """
+    rows = fit_rows(scene)
+    steps = list(rows.steps)
+    sides = [d for d in range(scene.dim) if d != inflow.axis]
+    for d in sides:
+        length = inflow.upper[d] - inflow.lower[d]
+        if not is_multiple(length, steps[d]):
+            fitted = length / max(1, math.floor(length / scene.spacing + 0.5))
+            steps[d] = min(fitted, WIDEST_ROWS * scene.spacing)
+    if tuple(steps) != rows.steps:
+        steps[inflow.axis] = rows.cell / math.prod(steps[d] for d in sides)
+    return tuple(steps)
 
 
 def calibrate_mass(scene: Scene) -> float:
-    """Particle mass [kg] that gives the infinite initial lattice its rest density: m = rho_0 / sum_j W_ij.
+    """Particle mass [kg] that gives the infinite initial lattice its rest density: m = rho_0 / sum_j W_ij, on `rows.fit_rows`.
 
     With m = rho_0 s^dim a Wendland lattice at r = 2s starts several percent too dense and explodes.
     """
     kernel = make_kernel(scene.kernel, scene.dim, scene.support)
-    return scene.rest_density / lattice_sum(kernel, scene.dim, scene.spacing)
+    return scene.rest_density / lattice_sum(kernel, fit_rows(scene).steps)
 
 
 def keep_outside(scene: Scene, solids: Sequence[Solid], x: np.ndarray) -> np.ndarray:

@@ -15,7 +15,9 @@ from taichi_rts.scene.fluids.shape import lattice
 from taichi_rts.scene.geometry.spanning import scene_solid, spans
 from taichi_rts.scene.obstacles.solid import Solid
 from taichi_rts.scene.parts.conditions import AXES
+from taichi_rts.scene.rows import fit_rows
 from taichi_rts.scene.scene import Scene
+from taichi_rts.scene.validation import Vector
 
 CONTINUED_LATTICE = 1.0
 WALL_STIFFNESS = 4.0 / 3.0
@@ -75,14 +77,15 @@ def line_walls(scene: Scene) -> tuple[WallLayer, np.ndarray]:
         return WallLayer(nothing, nothing, np.zeros(0), np.zeros(0), 0.0, 1.0), np.zeros(0, int)
     numbers: dict[str, int] = {wall.face: number for number, wall in enumerate(scene.moving_walls)}
     s = scene.spacing
-    depth, volume = calibrate_walls(scene)
+    depth, _ = calibrate_walls(scene)
     depths = plane_depths(scene, depth)
+    steps = fit_rows(scene).steps
     inner, stretch = [], []
-    for low, high in zip(scene.domain.lower, scene.domain.upper, strict=True):
+    for low, high, step in zip(scene.domain.lower, scene.domain.upper, steps, strict=True):
         count = max(1, round((high - low) / s))
         width = (high - low) / count
         inner.append(low + (np.arange(count) + 0.5) * width)
-        stretch.append(width / s)
+        stretch.append(width / step)
     positions, normals, volumes, deep, owners = [], [], [], [], []
     for axis in range(scene.dim):  # the two faces across `axis`; earlier axes' faces own the edges they share
         if scene.is_periodic[axis]:
@@ -97,7 +100,7 @@ def line_walls(scene: Scene) -> tuple[WallLayer, np.ndarray]:
         positions.append(lattice([*inner[:axis], faces, *beyond]))
         deep.append(lattice([*inner[:axis], np.concatenate([depths[::-1], depths]), *beyond])[:, axis])
         share = math.prod(stretch[d] for d in range(scene.dim) if d != axis)
-        volumes.append(np.full(len(positions[-1]), volume * share))
+        volumes.append(np.full(len(positions[-1]), face_volume(scene, steps, axis) * share))
         behind = positions[-1][:, axis] < scene.domain.lower[axis]
         normals.append(np.where(behind, 1.0, -1.0)[:, None] * np.eye(scene.dim)[axis])
         owners.append(np.where(behind, numbers.get(AXES[axis] + "-", -1), numbers.get(AXES[axis] + "+", -1)))
@@ -208,15 +211,34 @@ def calibrate_walls(scene: Scene) -> tuple[float, float]:
     for _ in range(60):
         middle = 0.5 * (near + far)
         near, far = (middle, far) if slope(laid, middle) / laid(middle) > wanted else (near, middle)
-    return near - 0.5 * s, missing(s) / (laid(near) * lattice_sum(kernel, dim, s))
+    return near - 0.5 * s, missing(s) / (laid(near) * lattice_sum(kernel, (s,) * dim))
 
 
-def plane_sum(scene: Scene) -> Callable[[float], float]:
-    """Return S(d): the sum of W over a plane of a lattice of the scene's spacing at distance d [m]."""
+def face_volume(scene: Scene, steps: Vector, axis: int) -> float:
+    """Volume V_b [m^dim] of wall particles at the faces across `axis`, for a fluid whose rows are `steps` [m], (dim,), apart.
+
+    As `calibrate_walls` has it, V S(d) = D m/rho_0, at the depth that it gives.
+    """
+    depth, volume = calibrate_walls(scene)
+    if steps == (scene.spacing,) * scene.dim:
+        return volume
+    across, along = steps[axis], (*steps[:axis], *steps[axis + 1 :])
+    plane, laid = plane_sum(scene, along), planes_sum(scene, along)
+    missing = sum(plane((k + 1) * across) for k in range(math.ceil(scene.support / across)))
     kernel = make_kernel(scene.kernel, scene.dim, scene.support)
-    reach = math.ceil(scene.support_ratio)
-    steps = scene.spacing * np.arange(-reach, reach + 1)
-    lateral2 = sum(g**2 for g in np.meshgrid(*[steps] * (scene.dim - 1)))
+    return missing / (laid(depth + 0.5 * across) * lattice_sum(kernel, steps))
+
+
+def plane_sum(scene: Scene, along: Sequence[float] = ()) -> Callable[[float], float]:
+    """Return S(d): the sum of W over a plane of a lattice at distance d [m].
+
+    Its rows are `along` [m], (dim - 1,), apart, by default the scene's spacing.
+    """
+    kernel = make_kernel(scene.kernel, scene.dim, scene.support)
+    sides = along or (scene.spacing,) * (scene.dim - 1)
+    reaches = [math.ceil(scene.support / side) for side in sides]
+    rows = [side * np.arange(-reach, reach + 1) for side, reach in zip(sides, reaches, strict=True)]
+    lateral2 = sum(g**2 for g in np.meshgrid(*rows))
     return lambda d: float(kernel.sample(np.sqrt(lateral2 + d * d)).sum())
 
 
@@ -229,7 +251,7 @@ def plane_depths(scene: Scene, depth: float) -> np.ndarray:
     return depths[depths < scene.support]
 
 
-def planes_sum(scene: Scene) -> Callable[[float], float]:
+def planes_sum(scene: Scene, along: Sequence[float] = ()) -> Callable[[float], float]:
     """Return the sum of `plane_sum` over all planes of a wall, as a function of the distance d [m] of the first."""
-    plane, s, count = plane_sum(scene), scene.spacing, scene.wall_planes
+    plane, s, count = plane_sum(scene, along), scene.spacing, scene.wall_planes
     return lambda d: sum(plane(d + k * s) for k in range(count))

@@ -55,3 +55,23 @@ def test_pressure_carries_the_water_above(pools, stepper):
 @pytest.mark.parametrize("stepper", ["regional", "asynchronous"])
 def test_it_is_as_calm_as_with_uniform_steps(pools, stepper):
     assert rms_speed(pools[stepper]) <= 1.2 * rms_speed(pools["uniform"]) + 0.002 * CALM
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("density", ["summation", "continuity"])
+@pytest.mark.parametrize(("size", "rows"), [((1.04, 0.5), (10, 5)), ((0.549, 0.58), (5, 6)), ((1.29, 0.59), (13, 6))])
+def test_a_pool_whose_size_is_no_multiple_of_the_spacing_rests_as_well(start_taichi, quick, size, rows, density):
+    """It began with gaps of up to a spacing at a wall, and fell into them at 0.5 sqrt(g H)."""
+    block = rts.Block((0, 0), size)
+    fields = {"spacing": SPACING, "density": density, "hydrostatic": True}
+    with start_taichi("cpu", "f32", **quick):
+        sim = rts.Simulation(rts.Scene(domain=rts.Box((0, 0), (size[0], 1.0)), fluids=[block], **fields))
+        assert sim.count == rows[0] * rows[1]
+        fastest = 0.0
+        for time in np.linspace(0.05, 1.0, 20):
+            sim.advance_to(time)
+            fastest = max(fastest, np.linalg.norm(sim.velocities(), axis=1).max())
+        height, stopped = sim.positions()[:, 1].mean(), sim.statistics["stopped_by_domain"]
+    assert fastest < 0.15 * np.sqrt(9.81 * size[1])
+    assert height == pytest.approx(0.5 * size[1], rel=0.03)
+    assert stopped == 0

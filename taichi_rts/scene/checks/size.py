@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from taichi_rts.device.counts import CELLS_PER_BLOCK
+from taichi_rts.scene.rows import cell_volume
 from taichi_rts.scene.scales import SceneScales
 
 MOST = 2**31 - 1
@@ -41,7 +42,7 @@ def size_of(scene: SceneScales, spacing: float | None = None) -> SceneSize:
             if not periodic
         ]
     return SceneSize(
-        particles=volume / s**scene.dim + sum(_flowing_in(scene, inflow, s) for inflow in scene.inflows),
+        particles=volume / cell_volume(scene, s) + sum(_flowing_in(scene, inflow, s) for inflow in scene.inflows),
         walls=sum(faces),
         blocks=math.prod(length / (scene.support_ratio * s) + MARGIN for length in scene.domain.size),
     )

@@ -73,17 +73,23 @@ class Block(FluidShape):
         sides = zip(self.lower, self.upper, other.lower, other.upper, strict=True)
         return max(max(c - b, a - d) for a, b, c, d in sides)
 
-    def fill(self, spacing: float, domain: Box) -> np.ndarray:
-        """Positions [m], (N, dim), of a lattice of `spacing` [m] whose cells all lie inside the block.
+    def rows(self, steps: Vector) -> tuple[int, ...]:
+        """How many rows `steps` [m] apart fit into it, (dim,), at least one."""
+        sides = zip(self.lower, self.upper, steps, strict=True)
+        return tuple(max(1, math.floor((b - a) / step * (1 + 1e-9) + 1e-6)) for a, b, step in sides)
 
-        A size that is no multiple of the spacing leaves a gap of less than one spacing, never an overlap: the lattice sits
-        at the face that touches a wall of the domain (the lower one if both or none do), so that it rests there.
+    def fill(self, steps: Vector, domain: Box) -> np.ndarray:
+        """Positions [m], (N, dim), of a lattice of `steps` [m], (dim,), whose cells all lie inside the block.
+
+        A size that is no multiple of the steps, as `rows.fit_rows` makes it, leaves a gap of less than one, never an overlap: the
+        lattice sits at the face that touches a wall of the domain (the lower one if both or none do), so that it rests there.
         """
         axes = []
-        for a, b, low, high in zip(self.lower, self.upper, domain.lower, domain.upper, strict=True):
-            count = max(1, math.floor((b - a) / spacing * (1 + 1e-9) + 1e-6))
-            tolerance = 1e-6 * spacing
+        for a, b, low, high, step, count in zip(
+            self.lower, self.upper, domain.lower, domain.upper, steps, self.rows(steps), strict=True
+        ):
+            tolerance = 1e-6 * step
             at_upper_wall = abs(b - high) < tolerance and abs(a - low) >= tolerance
-            start = b - count * spacing if at_upper_wall else a
-            axes.append(start + (np.arange(count) + 0.5) * spacing)
+            start = b - count * step if at_upper_wall else a
+            axes.append(start + (np.arange(count) + 0.5) * step)
         return lattice(axes)

@@ -227,7 +227,7 @@ class Particles(FluidShape):
         """All of the bounding box."""
         return np.ones(len(x), bool)
 
-    def fill(self, spacing: float, domain: Box) -> np.ndarray:
+    def fill(self, steps: Vector, domain: Box) -> np.ndarray:
         """Positions [m], (N, dim), as given, but none beyond the domain, where rounding may have put it."""
         return np.clip(self.positions, domain.lower, domain.upper)
 

@@ -63,8 +63,8 @@ class FluidShape:
         """
         raise NotImplementedError
 
-    def fill(self, spacing: float, domain: Box) -> np.ndarray:
-        """Positions [m], (N, dim), of its particles in a scene of `spacing` [m] and `domain`."""
+    def fill(self, steps: Vector, domain: Box) -> np.ndarray:
+        """Positions [m], (N, dim), of its particles in a scene whose rows are `steps` [m], (dim,), apart (`rows.fit_rows`)."""
         raise NotImplementedError
 
     def velocities_at(self, x: np.ndarray) -> np.ndarray:

@@ -86,13 +86,13 @@ class Sphere(FluidShape):
         nearest = [min(max(x, a), b) for x, a, b in zip(self.centre, other.lower, other.upper, strict=True)]
         return math.dist(self.centre, nearest) - self.radius
 
-    def fill(self, spacing: float, domain: Box) -> np.ndarray:
-        """Positions [m], (N, dim), of a lattice of `spacing` [m] that lie inside the sphere.
+    def fill(self, steps: Vector, domain: Box) -> np.ndarray:
+        """Positions [m], (N, dim), of a lattice of `steps` [m], (dim,), that lie inside the sphere.
 
         The lattice's cells meet at the centre, so it has the centre's mirror symmetries. A cell counts whole if its middle is
-        inside, so the surface is a staircase, but N s^dim is the volume to within a few cells.
+        inside, so the surface is a staircase, but N cells are the volume to within a few cells.
         """
-        count = math.ceil(self.radius / spacing)
-        offsets = lattice([(np.arange(-count, count) + 0.5) * spacing] * len(self.centre))
+        counts = [math.ceil(self.radius / step) for step in steps]
+        offsets = lattice([(np.arange(-n, n) + 0.5) * step for n, step in zip(counts, steps, strict=True)])
         inside = np.linalg.norm(offsets, axis=1) <= self.radius * (1 + 1e-9)
         return np.asarray(self.centre) + offsets[inside]

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.device.backend import ti
-from taichi_rts.sampling.sampling import fill_patch
+from taichi_rts.errors import TimeError
+from taichi_rts.sampling.sampling import fill_patch, patch_steps
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.particles.extra import Extra
 from taichi_rts.solver.particles.particles import FluidState
@@ -21,7 +22,7 @@ class Patch:
     def __init__(self, scene: Scene, number: int) -> None:
         self.inflow = inflow = scene.inflows[number]
         self.positions = fill_patch(scene, inflow)
-        self.interval = scene.spacing / inflow.normal_speed
+        self.interval = patch_steps(scene, inflow)[inflow.axis] / inflow.normal_speed
         """Time [s] between layers."""
         self.guidance = scene.support / inflow.normal_speed
         """Time [s] for which a layer keeps its velocity."""
@@ -77,6 +78,19 @@ class Inflows(Extra):
     def entered(self) -> int:
         """How many particles have entered so far."""
         return sum(done * len(patch.positions) for done, patch in zip(self.done, self.patches, strict=True))
+
+    def require_room(self, time: float, slack: float) -> None:
+        """Raise `TimeError` if a run to `time` [s] would need particles for which no memory was reserved.
+
+        That of an inflow without a `stop` is, until the scene's end; `slack` [s] later than that is no error.
+        """
+        end = self.scene.end_time
+        endless = [number for number, patch in enumerate(self.patches) if patch.inflow.stop is None]
+        if endless and time > end + slack:
+            raise TimeError(
+                f"time {time:g} s lies after the scene's end_time {end:g} s, until which memory is reserved for what flows in "
+                f"through inflows.{endless[0]}; start with scene.replace(end_time={time:g}), or with a stop at which it ends"
+            )
 
     def before_sort(self, now: int, tick: float, before_change: Callable[[], object]) -> None:
         """Let in what has crossed its patch by tick `now`."""

@@ -111,6 +111,19 @@ def test_uniform_steps_are_held_against_nothing():
     assert report.uniform_facts(sim, statistics | {"active_fraction": 1.0}) == []
 
 
+def test_table_says_which_sizes_were_rounded(capsys, monkeypatch):
+    sim = simulation(rts.Regional(), [0.2, 0.8], [0.3, 0.7])
+    monkeypatch.setattr(report, "console", Console(width=120))
+    report.print_table(sim, Energy(1.0, 2.0, 1.0))
+    assert "rounded" not in capsys.readouterr().out
+    sim.scene = rts.Scene(domain=rts.Box((0, 0), (3, 1)), fluids=[rts.Block((0, 0), (0.26, 0.59))], spacing=0.1)
+    report.print_table(sim, Energy(1.0, 2.0, 1.0))
+    words = " ".join(capsys.readouterr().out.split())
+    assert "rows 0.095 x 0.09833 m apart, so that they fit" in words
+    assert "rounded fluids.0: size rounded to 0.285 x 0.59 m, from 0.26 x 0.59 m" in words
+    assert "volume 0.1681 of 0.1534 m^2 asked for (+9.6%)" in words
+
+
 def test_energy_gained_asks_for_shorter_steps():
     start = Energy(1.0, 2.0, 1.0)
     assert report.energy_fact(0.004, start) == "0.40% of 4 J at the start"
@@ -158,5 +171,5 @@ def test_the_list_of_scenes_counts_what_a_run_has(capsys, monkeypatch):
     report.print_scenes(scenes)
     out = capsys.readouterr().out
     assert "end [s]" in out
-    for scene, count in zip(scenes, (34_320, len(sample(scenes[1]).positions)), strict=True):
+    for scene, count in zip(scenes, (35_640, len(sample(scenes[1]).positions)), strict=True):
         assert f"{count:,}" in next(line for line in out.splitlines() if f" {scene.name} " in line)

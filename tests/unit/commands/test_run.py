@@ -54,6 +54,8 @@ def test_run_writes_frames_and_facts(two_runs):
     for key in ("scene", "stepper", "arch", "particles", "end_time", "base_steps", "particle_updates", "wall_seconds"):
         assert key in facts
     assert facts["end_time"] == 0.1
+    assert facts["filling"]["wanted"] == facts["filling"]["filled"] == pytest.approx(1.2)
+    assert facts["filling"]["rounded"] == []
     assert facts["active_fraction"] == pytest.approx(
         facts["particle_updates"] / facts["particles"] / facts["base_steps"]
     )

@@ -71,30 +71,6 @@ def test_public_names_exist():
     assert all(issubclass(error, rts.Error) for error in errors)
 
 
-@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="Linux only")
-def test_threads_have_a_core_each_where_there_is_one_for_every_core(taichi_cpu):
-    cores = os.sched_getaffinity(0)
-    pinned = [os.sched_getaffinity(int(thread)) for thread in os.listdir("/proc/self/task")]
-    if backend.threads() == len(cores) > 1:
-        assert {core for each in pinned if len(each) == 1 for core in each} == cores
-    assert os.sched_getaffinity(0) == cores  # the caller itself stays free
-
-
-def test_fewer_threads_than_cores_are_free_to_move(monkeypatch):
-    calls = []
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1, 2}, raising=False)
-    monkeypatch.setattr(os, "sched_setaffinity", lambda thread, cores: calls.append((thread, cores)), raising=False)
-    monkeypatch.setattr(backend, "threads", lambda: 2)
-    backend.pin_threads([11, 12, 13])
-    assert calls == []
-    monkeypatch.setattr(backend, "threads", lambda: 3)
-    backend.pin_threads([10, 11, 12, 13])
-    assert calls == [(11, {0}), (12, {1}), (13, {2})]
-    monkeypatch.setenv("TAICHI_RTS_PIN", "0")
-    backend.pin_threads([11, 12, 13])
-    assert len(calls) == 3
-
-
 def imported(choice, code="import taichi_rts"):
     environment = os.environ | {"TAICHI_RTS_TAICHI": choice}
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, env=environment)

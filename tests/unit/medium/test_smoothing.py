@@ -57,4 +57,4 @@ def test_both_vanish_smoothly_at_the_support(taichi_cpu_f64, name, dim):
 def test_lattice_sum_counts_every_neighbour():
     kernel = make_kernel("cubic_spline", 2, 2.0)  # h = 1: of a unit lattice only 4 sides and 4 corners are inside
     expected = kernel.sample(0.0) + 4 * kernel.sample(1.0) + 4 * kernel.sample(np.sqrt(2.0))
-    assert lattice_sum(kernel, 2, 1.0) == pytest.approx(expected, rel=1e-14)
+    assert lattice_sum(kernel, (1.0, 1.0)) == pytest.approx(expected, rel=1e-14)

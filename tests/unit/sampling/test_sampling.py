@@ -140,7 +140,7 @@ def test_scene_without_walls_has_no_wall_particles():
 @pytest.mark.parametrize("top", [0.5, 0.54, 0.55, 0.599])
 def test_size_that_is_no_multiple_leaves_a_gap_not_an_overlap(top):
     scene = filled(2, top=top)
-    x = scene.fluids[0].fill(scene.spacing, scene.domain)
+    x = scene.fluids[0].fill((scene.spacing,) * 2, scene.domain)
     assert len(x) == 25
     assert x.min() == pytest.approx(0.5 * S)
     assert x.max() + 0.5 * S <= top + 1e-9
@@ -149,7 +149,7 @@ def test_size_that_is_no_multiple_leaves_a_gap_not_an_overlap(top):
 @pytest.mark.parametrize(("lower", "upper", "first"), [(0.43, 1.0, 0.55), (0.43, 0.98, 0.48), (0.0, 1.0, 0.05)])
 def test_lattice_rests_on_the_wall_it_touches(lower, upper, first):
     block = rts.Block((lower, 0.0), (upper, 0.3))
-    x = block.fill(S, rts.Box((0, 0), (1, 1)))
+    x = block.fill((S, S), rts.Box((0, 0), (1, 1)))
     assert x[:, 0].min() == pytest.approx(first)
     assert x[:, 0].max() + 0.5 * S <= upper + 1e-9
 
@@ -177,7 +177,7 @@ def test_velocities_and_order_follow_the_blocks():
 def test_sphere_is_filled_symmetrically_about_its_centre(dim, count):
     centre = (0.43, 0.52, 0.5)[:dim]
     sphere = rts.Sphere(centre, 0.42)
-    offsets = sphere.fill(S, rts.Box((0,) * dim, (1,) * dim)) - centre
+    offsets = sphere.fill((S,) * dim, rts.Box((0,) * dim, (1,) * dim)) - centre
     assert len(offsets) == count
     assert count * S**dim == pytest.approx(sphere.volume, rel=0.1)
     assert np.linalg.norm(offsets, axis=1).max() <= 0.42
@@ -190,7 +190,7 @@ def test_sphere_is_filled_symmetrically_about_its_centre(dim, count):
 
 def test_smallest_sphere_has_a_particle_in_each_quadrant():
     sphere = rts.Sphere((0.5, 0.5), S)
-    assert len(sphere.fill(S, rts.Box((0, 0), (1, 1)))) == 4
+    assert len(sphere.fill((S, S), rts.Box((0, 0), (1, 1)))) == 4
 
 
 @pytest.mark.parametrize("touching", [0.0, 1e-12])

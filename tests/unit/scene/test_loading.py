@@ -140,7 +140,14 @@ def test_plain_data_survives_a_round_trip():
 def test_particle_counts(text, count):
     assert parse_count(text) == count
     spacing = rts.load_scene("dam_break", particles=text).spacing
-    assert 0.5 / spacing**3 == pytest.approx(count, rel=1e-9)
+    assert 0.5 / spacing**3 == pytest.approx(count, rel=0.03)
+
+
+def test_a_count_chooses_a_spacing_that_divides_the_scenes_lengths():
+    assert rts.load_scene("dam_break", particles="3k").spacing == pytest.approx(
+        1 / 18
+    )  # not (0.5/3000)^(1/3) = 1/18.17
+    assert rts.load_scene("torricelli", particles="1k").spacing == pytest.approx(1 / 30)
 
 
 @pytest.mark.parametrize("text", ["x", "", "-5", "0", "nan", "inf", "1e12", "1.5G"])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
-from taichi_rts.sampling.sampling import compress, fill_patch, sample
+from taichi_rts.sampling.sampling import compress, fill_patch, patch_steps, sample
 from taichi_rts.sampling.walls import line_walls
 
 UNIT = rts.Box((0, 0), (1, 1))
@@ -251,6 +251,45 @@ def test_fluid_flows_in_layer_by_layer(simulate, stepper):
     jet.advance_to(0.3)
     assert jet.count - pool == 2 * 6  # 0.1 s at 3 m/s are 6 layers 0.05 apart
     assert (jet.densities()[pool:] > 500).any()
+
+
+@pytest.mark.parametrize(("width", "rows"), [(0.1, 2), (0.13, 3), (0.17, 3), (0.06, 1), (0.09, 2)])
+def test_area_times_speed_flows_in(simulate, width, rows):
+    """Also where the patch is no multiple of the spacing: one of 0.09 m let in 56 % of its water."""
+    jet = rts.Inflow((0.4, 1.0), (0.4 + width, 1.0), (0, -3))
+    fountain = scene(inflows=[jet], gravity=(0, 0), sound_speed=30.0, end_time=2.0)
+    x = fill_patch(fountain, jet)
+    assert len(x) == rows
+    assert x[:, 0].mean() == pytest.approx(0.4 + 0.5 * width)
+    layer = patch_steps(fountain, jet)[1]
+    assert rows * 0.05**2 == pytest.approx(width * layer)
+    sim = simulate(fountain, rts.Uniform())
+    before = sim.count
+    sim.advance_to(0.2)
+    assert (sim.count - before) * 0.05**2 == pytest.approx(width * 3 * 0.2, abs=0.5 * width * layer + 1e-9)
+
+
+def test_a_time_beyond_that_of_which_memory_was_reserved_for_an_inflow_is_one_error(simulate):
+    endless = rts.Inflow((0.4, 1.0), (0.5, 1.0), (0, -3))
+    sim = simulate(scene(inflows=[JET, endless], gravity=(0, 0), sound_speed=30.0, end_time=0.05), rts.Uniform())
+    start, said = (
+        sim.count,
+        r"time 3 s lies after the scene's end_time 0\.05 s, .* inflows\.1; start with scene.replace\(end_time=3",
+    )
+    frames = []
+    with pytest.raises(rts.TimeError, match=said):
+        sim.advance_to(3.0)
+    with pytest.raises(rts.TimeError, match=said):
+        sim.run(3.0, frames.append)
+    assert (sim.time, sim.count, frames) == (0.0, start, [])
+    sim.advance_to(0.05)
+    assert sim.count == start + 2 * 2 * 3
+    longer = simulate(sim.scene.replace(end_time=0.1), rts.Uniform())
+    longer.advance_to(0.1)
+    assert longer.count == start + 2 * 2 * 6
+    stopped = simulate(scene(inflows=[JET], gravity=(0, 0), sound_speed=30.0, end_time=0.05), rts.Uniform())
+    stopped.advance_to(0.2)  # its inflow has an end of its own
+    assert stopped.count == start + 2 * 6
 
 
 @pytest.mark.slow
