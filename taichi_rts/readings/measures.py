@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.medium.medium import Medium
-from taichi_rts.sampling.walls import line_walls
+from taichi_rts.sampling.faces import line_walls
 from taichi_rts.scene.geometry.periodic import nearest_image, periods
 from taichi_rts.scene.near_pairs import near_pairs
 from taichi_rts.scene.parts.conditions import AXES, face_axis
