@@ -37,7 +37,8 @@ class Following(Part, Extra):
         self.grid = grid
         self.geometry: Tiles = grid.geometry
         self.walls = list(walls)
-        self.carried: list[ti.Field] = []
+        self.carried: list[tuple[ti.Field, ti.Field]] = []
+        """What moves along with blocks, and where it is put down meanwhile."""
         self.strays = ti.field(ti.i32, ())
         self.changes = 0
 
@@ -49,8 +50,9 @@ class Following(Part, Extra):
     def carry(self, fields: Sequence[ti.Field], dtype: Any) -> None:
         """Have what these `fields`, (blocks,) each, hold move along with their blocks; reals are of `dtype`."""
         listed = [self.grid.occupied, *([self.grid.vacated] if self.grid.tracks_vacated else [])]
-        self.carried = [each for each in fields if not any(each is other for other in listed)]
-        self.make_fields(self.fields(self.geometry.blocks, sound=any(map(is_real, self.carried))), dtype)
+        moving = [each for each in fields if not any(each is other for other in listed)]
+        self.make_fields(self.fields(self.geometry.blocks, sound=any(map(is_real, moving))), dtype)
+        self.carried = [(each, self.real_scratch if is_real(each) else self.grid.cell_count) for each in moving]
 
     def before_sort(self, now: int, tick: float, before_change: Callable[[], object]) -> None:
         """Have blocks kept around every particle at tick `now`."""
@@ -117,7 +119,7 @@ class Following(Part, Extra):
     @ti.kernel
     def list_blocks(self, places: Indices, held: Indices, now: ti.i32, tick: float):
         """List the numbers in the whole domain of the blocks where particles are now, and where they were at the last sort."""
-        geometry = ti.static(self.geometry)
+        geometry = self.geometry
         for i in range(self.particles.alive[None]):
             x = self.motion.present_position(i, now, tick)
             places[i] = geometry.row(x) * geometry.shape[0] + geometry.column(x[0]) // CELLS_PER_BLOCK
@@ -131,9 +133,8 @@ class Following(Part, Extra):
         The n-th new tile was at slot `came_from[n]`, or if it was not `there`, would have been before the one that is. Slot s
         becomes `new_slots[s]`. `cell_count`, which holds nothing between two sorts, serves to put things down.
         """
-        grid = ti.static(self.grid)
-        for field in ti.static(self.carried):
-            scratch = ti.static(self.real_scratch if is_real(field) else grid.cell_count)
+        grid = self.grid
+        for field, scratch in ti.static(self.carried):
             for n in range(came_from.shape[0] * TILE):
                 slot = came_from[n // TILE] * there[n // TILE]
                 scratch[n] = field[slot * TILE + n % TILE]

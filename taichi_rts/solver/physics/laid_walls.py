@@ -21,41 +21,44 @@ Indices: Any = ti.types.ndarray(dtype=ti.i32, ndim=1)
 
 
 def most_along(scene: Scene, geometry: Geometry, spacing: float, axis: int, blocks: int) -> int:
-    """Return how many different coordinates wall particles have in so many blocks one behind the other, at most."""
+    """Return how many coordinates of a wall's lattice lie in so many blocks one behind the other, at most."""
     length = scene.domain.size[axis]
     width = length / max(1, round(length / spacing))
-    return math.ceil(blocks * geometry.sides[axis] / width - 1e-9) + 1 + 2 * scene.wall_planes
+    return math.ceil(blocks * geometry.sides[axis] / width - 1e-9) + 1
 
 
 def densest_column(scene: Scene, geometry: Geometry, spacing: float) -> int:
     """Return how many wall particles the blocks in and around one row hold at one column, at most."""
-    total = 0
+    reach, total = [1] + [3] * (scene.dim - 1), 0
     for face in range(scene.dim):
-        reach = [1] + [3] * (scene.dim - 1)
-        sides = [most_along(scene, geometry, spacing, axis, reach[axis]) for axis in range(scene.dim)]
+        sides = [most_along(scene, geometry, spacing, d, reach[d]) + 2 * scene.wall_planes for d in range(scene.dim)]
         sides[face] = scene.wall_planes * (2 if geometry.inside[face] <= reach[face] else 1)
         total += math.prod(sides)
     return total
 
 
 def room_for_walls(scene: Scene, geometry: Geometry, spacing: float, particles: int) -> int:
-    """Return how many wall particles may be laid at once, at most, near so many fluid particles; as many as there are suffice.
+    """Return how many wall particles may have to be laid at once, at most, for so many particles of fluid.
 
-    That is each with a face in the tiles around it, on both sides where the domain is thin, and besides all that lies within
-    two tiles of an edge, where there are more.
+    Each may have a face in all tiles around it, or two where the domain is thin, and in the one where it was before. What lies
+    within two tiles of an edge comes on top; and there are no more than lie behind all faces.
     """
-    dim, planes, reach = scene.dim, scene.wall_planes, 2 * TILE + 1
-    per = [geometry.sides[axis] / spacing + 1.0 for axis in range(dim)]  # of a block, along each axis
-    each = planes * 2 * TILE * 3 ** (dim - 2) * math.prod(sorted(math.ceil(p - 1e-9) for p in per)[1:])
-    each *= 1 + sum(n <= 3 for n in geometry.inside)
+    dim, planes = scene.dim, scene.wall_planes
+    most = [[most_along(scene, geometry, spacing, axis, n) for axis in range(dim)] for n in (2 * TILE, TILE, 3, 1)]
+    wide, own = (
+        along[0] * (max(aside[1:]) if dim == 3 else 1) for along, aside in ((most[0], most[2]), (most[1], most[3]))
+    )
+    each = planes * (wide + own) * (1 + sum(n <= 3 for n in geometry.inside))
     lengths = [scene.domain.size[axis] / spacing + 2.0 * planes + 2.0 for axis in range(dim)]
-    edges = 0.0
-    for face in range(dim):  # near each edge, or corner in two dimensions, of both faces across `face`
+    near = [
+        min(n, most_along(scene, geometry, spacing, axis, 2 * TILE + 1) + planes) for axis, n in enumerate(lengths)
+    ]
+    edges = every = 0.0
+    for face in range(dim):
         others = [axis for axis in range(dim) if axis != face]
-        for edge in others:
-            near = [min(lengths[a], reach * per[a]) if a == edge else lengths[a] for a in others]
-            edges += 4.0 * planes * math.prod(near)
-    every = sum(2.0 * planes * math.prod(lengths[:face] + lengths[face + 1 :]) for face in range(dim))
+        every += 2.0 * planes * math.prod(lengths[axis] for axis in others)
+        for edge in others:  # of the edges between these two faces, or corners in two dimensions, what is behind `face`
+            edges += 4.0 * planes * math.prod(near[axis] if axis == edge else lengths[axis] for axis in others)
     return math.ceil(min(particles * each + edges, every))
 
 
