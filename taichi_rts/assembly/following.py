@@ -52,7 +52,7 @@ def laid_walls(scene: Scene, near: Neighbourhood, geometry: Tiles, particles: in
 
 def follow(motion: Motion, grid: BlockGrid, walls: list[Any]) -> list[Following]:
     """Return what has the grid follow the particles, if it does."""
-    return [Following(motion, grid, walls)] if grid.geometry.follows else []
+    return [Following(motion, grid, grid.geometry, walls)] if isinstance(grid.geometry, Tiles) else []
 
 
 def begin_to_follow(solver: Solver, dtype: Any) -> None:

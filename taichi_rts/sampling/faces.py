@@ -48,6 +48,29 @@ class Faces:
         along = np.broadcast_to(np.ix_(*across)[self.axis], shape).reshape(-1)
         return self._layer(lattice(list(self.coordinates)), along), self.behind_lower[along]
 
+    def select(self, bins: Sequence[np.ndarray], wanted: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
+        """Return the numbers along each axis, (M,) each, of the particles in the `wanted` bins, and in the how manieth, (M,).
+
+        `bins` says for each axis in which bin each coordinate lies, ascending; `wanted` names bins by these, (K,) for each axis.
+        """
+        low, counts = self.ranges(bins, wanted)
+        total = np.prod(counts, axis=0)
+        which = np.repeat(np.arange(len(total)), total)
+        n = np.arange(len(which)) - np.repeat(np.cumsum(total) - total, total)
+        numbers: list[np.ndarray] = []
+        for first, count in zip(low[::-1], counts[::-1], strict=True):
+            n, within = np.divmod(n, count[which])
+            numbers.insert(0, first[which] + within)
+        return numbers, which
+
+    def ranges(self, bins: Sequence[np.ndarray], wanted: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Return the first number and the count of coordinates in each of the `wanted` bins, (dim, K) both."""
+        low, high = (
+            np.stack([np.searchsorted(have, want, side) for have, want in zip(bins, wanted, strict=True)])
+            for side in ("left", "right")
+        )
+        return low, high - low
+
     def some(self, numbers: Sequence[np.ndarray]) -> WallLayer:
         """Return those whose coordinates have these `numbers` along each axis, (M,) each."""
         positions = np.stack([x[n] for x, n in zip(self.coordinates, numbers, strict=True)], axis=-1)
@@ -83,9 +106,7 @@ def faces_of(scene: Scene) -> list[Faces]:
             continue
         across = np.concatenate([lower[axis] - depths[::-1], upper[axis] + depths])
         beyond = [
-            inner[d]
-            if scene.is_periodic[d]
-            else np.concatenate([lower[d] - depths[::-1], inner[d], upper[d] + depths])
+            inner[d] if scene.is_periodic[d] else np.concatenate([lower[d] - depths[::-1], inner[d], upper[d] + depths])
             for d in range(axis + 1, scene.dim)
         ]
         share = math.prod(stretch[d] for d in range(scene.dim) if d != axis)
@@ -121,6 +142,20 @@ def line_walls(scene: Scene) -> tuple[WallLayer, np.ndarray]:
     layer = layers[0].joined(layers[1:])
     kept = ~behind_inflows(scene, layer)
     return layer.choose(kept), np.concatenate(owners)[kept]
+
+
+def walls_near(scene: Scene, faces: Sequence[Faces], x: np.ndarray) -> WallLayer:
+    """Return those of `faces` within the support radius of any of the points `x` [m], (N, dim), and some that are not."""
+    r, lower = scene.support, np.asarray(scene.domain.lower)
+    occupied = np.unique(np.floor((x[np.isfinite(x).all(axis=1)] - lower) / r).astype(np.int64), axis=0)
+    around = np.stack(list(np.ndindex(*[3] * scene.dim))) - 1
+    wanted = np.unique((occupied[:, None] + around).reshape(-1, scene.dim), axis=0)
+    layers = [no_walls(scene)[0]]
+    for each in faces:
+        bins = [np.floor((c - low) / r).astype(np.int64) for c, low in zip(each.coordinates, lower, strict=True)]
+        layers.append(each.some(each.select(bins, list(wanted.T))[0]))
+    layer = layers[0].joined(layers[1:])
+    return layer.choose(~behind_inflows(scene, layer))
 
 
 def no_walls(scene: Scene) -> tuple[WallLayer, np.ndarray]:

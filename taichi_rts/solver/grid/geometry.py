@@ -25,9 +25,6 @@ class Geometry:
     are places for. All else asks for neighbours by `beside`, `across`, `first_cell` and `base_beside`.
     """
 
-    follows = False
-    """Whether only blocks near particles are kept."""
-
     def __init__(
         self,
         lower: Sequence[float],
@@ -90,7 +87,7 @@ class Geometry:
 
     @ti.func
     def run_of(self, block):
-        """Row and column of `block`, which `block_at` and `first_cell` take: columns of blocks in a run along x follow each other."""
+        """Row and column of `block`, which `block_at` and `first_cell` take; in a run along x columns follow each other."""
         return block // self.shape[0], block % self.shape[0]
 
     @ti.func

@@ -46,8 +46,6 @@ class Tiles(Geometry, Part):
     those to the left and to the right, are all kept.
     """
 
-    follows = True
-
     def __init__(
         self, lower: Sequence[float], upper: Sequence[float], support: float, drift: float, particles: int
     ) -> None:
@@ -55,6 +53,7 @@ class Tiles(Geometry, Part):
         self.slots = slots_for(particles, self.shape)
         self.rows = math.prod(self.shape[1:])
         self.tiles = tiles_in_row(self.shape)
+        self.rows_of_offsets = [sum((step + 1) * 3**d for d, step in enumerate(each[1:])) for each in self.offsets]
         self.blocks = self.slots * TILE
         self.cells = self.slots * CELLS
         self.make_fields(self.table_fields(self.slots, self.rows, self.dim))
@@ -77,7 +76,7 @@ class Tiles(Geometry, Part):
         return rows * self.tiles + tiles
 
     def keys_around(self, numbers: np.ndarray, margin: int) -> np.ndarray:
-        """Return the tiles within `margin` <= `TILE` blocks of the blocks with these `numbers`, (N,) of the whole domain, ascending."""
+        """Return the tiles within `margin` <= `TILE` blocks of the blocks `numbers`, (N,) of the whole domain; ascending."""
         row, column = np.divmod(np.unique(numbers).astype(np.int64), self.shape[0])
         ends = [np.clip(column + step, 0, self.shape[0] - 1) // TILE for step in (-margin, margin)]
         row, tile = np.divmod(np.unique(np.concatenate([row * self.tiles + end for end in ends])), self.tiles)
@@ -206,9 +205,7 @@ class Tiles(Geometry, Part):
     @ti.func
     def beside(self, block, k: ti.template()):
         """Index of the k-th of the 8 (26) blocks around `block`."""
-        dx, dy = ti.static(self.offsets[k][0], self.offsets[k][1])
-        dz = ti.static(self.offsets[k][2] if self.dim == 3 else -1)
-        return self.across(block, ti.static((dz + 1) * 3 + dy + 1)) + dx
+        return self.across(block, ti.static(self.rows_of_offsets[k])) + self.offsets[k][0]
 
     @ti.func
     def run_of(self, block):

@@ -7,7 +7,7 @@ import numpy as np
 
 from taichi_rts.device.backend import ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
-from taichi_rts.device.fields import Declared, Part, integers, reals
+from taichi_rts.device.fields import Declared, Part, reals
 from taichi_rts.errors import ResourceError
 from taichi_rts.solver.grid.grid import BlockGrid
 from taichi_rts.solver.grid.tiles import CELLS, OUTSIDE, TILE, Tiles
@@ -31,11 +31,11 @@ class Following(Part, Extra):
 
     transient = frozenset({"carried", "real_scratch", "strays"})
 
-    def __init__(self, motion: Motion, grid: BlockGrid, walls: Sequence[LaidWalls]) -> None:
+    def __init__(self, motion: Motion, grid: BlockGrid, geometry: Tiles, walls: Sequence[LaidWalls]) -> None:
         self.motion = motion
         self.particles = motion.particles
         self.grid = grid
-        self.geometry: Tiles = grid.geometry
+        self.geometry = geometry
         self.walls = list(walls)
         self.carried: list[tuple[ti.Field, ti.Field]] = []
         """What moves along with blocks, and where it is put down meanwhile."""

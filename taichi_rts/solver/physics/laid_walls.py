@@ -50,9 +50,7 @@ def room_for_walls(scene: Scene, geometry: Geometry, spacing: float, particles: 
     )
     each = planes * (wide + own) * (1 + sum(n <= 3 for n in geometry.inside))
     lengths = [scene.domain.size[axis] / spacing + 2.0 * planes + 2.0 for axis in range(dim)]
-    near = [
-        min(n, most_along(scene, geometry, spacing, axis, 2 * TILE + 1) + planes) for axis, n in enumerate(lengths)
-    ]
+    near = [min(n, most_along(scene, geometry, spacing, axis, 2 * TILE + 1) + planes) for axis, n in enumerate(lengths)]
     edges = every = 0.0
     for face in range(dim):
         others = [axis for axis in range(dim) if axis != face]
@@ -67,6 +65,7 @@ class LaidWalls(Walls):
     """Wall particles at rest of the tiles that `geometry` keeps, up to `room` of them; `faces` are those of the `scene`."""
 
     transient = frozenset({"scene", "faces", "steps"})
+    geometry: Tiles
 
     def __init__(
         self,
@@ -102,21 +101,16 @@ class LaidWalls(Walls):
 
     def count_in(self, keys: np.ndarray) -> int:
         """Return how many wall particles lie in the tiles `keys`, (used,), those behind inflows too."""
-        return sum(int(np.prod(self._range(k, keys)[1], axis=0).sum()) for k in range(len(self.faces)))
+        wanted = self._wanted(keys)
+        found = (each.ranges(self._bins(k), wanted)[1] for k, each in enumerate(self.faces))
+        return sum(int(np.prod(counts, axis=0).sum()) for counts in found)
 
     def lay(self) -> None:
         """Lay the wall particles of the tiles that the grid keeps, in the order that they would have among all."""
         keys = self.geometry.keys()
         layers, cells = [], []
         for k, each in enumerate(self.faces):
-            low, counts = self._range(k, keys)
-            total = np.prod(counts, axis=0)
-            slot = np.repeat(np.arange(len(keys)), total)
-            n = np.arange(len(slot)) - np.repeat(np.cumsum(total) - total, total)
-            numbers = []
-            for first, count in zip(low[::-1], counts[::-1], strict=True):  # the last axis is fastest
-                n, within = np.divmod(n, count[slot])
-                numbers.insert(0, first[slot] + within)
+            numbers, slot = each.select(self._bins(k), self._wanted(keys))
             column = self.steps[k][0][numbers[0]] - keys[slot] % self.geometry.tiles * CELLS
             layers.append(each.some(numbers))
             cells.append((slot + 1) * CELLS + column)
@@ -130,19 +124,18 @@ class LaidWalls(Walls):
         values = (layer.positions, layer.volumes, layer.normals, layer.depths)
         self.load_some(*(each[order].astype(self.numpy_dtype) for each in values), start)
 
-    def _range(self, face: int, keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return first number and count of a face's coordinates in each of the tiles, (dim, used) both."""
+    def _bins(self, face: int) -> list[np.ndarray]:
+        """Return in which tile of a row, and in which rows, each of a face's coordinates lies."""
+        return [self.steps[face][0] // CELLS, *self.steps[face][1:]]
+
+    def _wanted(self, keys: np.ndarray) -> list[np.ndarray]:
+        """Return the same of tiles."""
         row, tile = np.divmod(keys, self.geometry.tiles)
         wanted, stride = [tile], 1
         for length in self.geometry.shape[1:]:
             wanted.append(row // stride % length)
             stride *= length
-        steps = [self.steps[face][0] // CELLS, *self.steps[face][1:]]
-        low, high = (
-            np.stack([np.searchsorted(have, want, side) for have, want in zip(steps, wanted, strict=True)])
-            for side in ("left", "right")
-        )
-        return low, high - low
+        return wanted
 
     @ti.kernel
     def load_some(self, x: Rows, volume: Values, normal: Rows, depths: Values, start: Indices):
