@@ -113,7 +113,7 @@ def test_water_that_has_no_room_to_spread_is_said(everywhere, taichi_cpu, monkey
 @pytest.mark.parametrize(("spacing", "most"), [(0.1, 32), (0.05, 128)])
 @pytest.mark.parametrize("stepper", [rts.Uniform(), rts.Regional(), rts.Asynchronous()], ids=lambda each: each.name)
 def test_a_cubic_metre_in_a_hall(spacing, most, stepper):
-    """All fields, and what sampling takes [MiB]; a grid of the whole hall takes 4.3 GiB, at half the spacing 34."""
+    """All fields, and what sampling takes [MiB]; a grid of the whole hall takes 4.4 GiB, at half the spacing 34."""
     scene = HALL.replace(spacing=spacing)
     needed = memory.device_bytes(scene, stepper, "f32") + memory.host_bytes(scene)
     assert needed < most * 2**20
