@@ -40,7 +40,7 @@ RUNS = {
     "regional sound, flowing": (FLOWING, rts.Regional()),
     "asynchronous, flowing": (FLOWING, rts.Asynchronous(stagger=3, steps="integers")),
 }
-QUICK = ("uniform", "regional sound, flowing")
+QUICK = ("regional sound, flowing",)
 every_run = pytest.mark.parametrize(
     "name", [each if each in QUICK else pytest.param(each, marks=pytest.mark.slow) for each in RUNS]
 )
@@ -78,7 +78,7 @@ def test_bits_are_those_of_a_grid_of_the_whole_domain(name, everywhere, taichi_c
     for whole, some in zip(found[: len(times)], found[len(times) :], strict=True):
         for one, two in zip(whole, some, strict=True):
             np.testing.assert_array_equal(one, two)
-    assert sim.statistics["grid_changes"] >= 3
+    assert sim.statistics["grid_changes"] >= 2
 
 
 def test_a_run_that_is_put_back_or_taken_up_again_goes_on_with_the_same_bits(everywhere, taichi_cpu, tmp_path):

@@ -148,9 +148,9 @@ class LaidWalls(Walls):
                 self.depths[b] = depths[b]
         for cell in self.start:
             self.start[cell] = start[ti.min(cell, start.shape[0] - 1)]
-        for block in range(start.shape[0] // CELLS_PER_BLOCK):
+        for block in self.near:
             near = 0
-            if self.geometry.safe(block * CELLS_PER_BLOCK):
+            if (block + 1) * CELLS_PER_BLOCK < start.shape[0] and self.geometry.safe(block * CELLS_PER_BLOCK):
                 near = self.count_at(block)
                 for k in ti.static(range(len(self.geometry.offsets))):
                     near += self.count_at(self.geometry.beside(block, k))
