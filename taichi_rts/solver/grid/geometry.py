@@ -193,6 +193,11 @@ class Geometry:
         return self.row(x) * self.row_length + column
 
     @ti.func
+    def has_left(self, cell, x):
+        """Whether position `x` [m], (dim,), does not lie in `cell`, or that is negative."""
+        return self.cell(x) != cell
+
+    @ti.func
     def row_beside(self, row, dy, dz):
         """Number of the row of blocks `dy` and `dz` rows further, in two dimensions `dy` alone."""
         other = row + dy

@@ -181,6 +181,13 @@ class Tiles(Geometry, Part):
         return self.slot(self.row(x), tile) * CELLS + column - tile * CELLS
 
     @ti.func
+    def has_left(self, cell, x):
+        """Whether position `x` [m], (dim,), does not lie in `cell`, or that is negative; without a search for its tile."""
+        slot = ti.max(cell, 0) // CELLS
+        column = self.tile_of[slot] * CELLS + cell % CELLS
+        return cell < 0 or self.column(x[0]) != column or self.row(x) != self.row_of[slot]
+
+    @ti.func
     def number(self, block):
         """Number of `block` among all of the domain and its margin."""
         slot = block // TILE

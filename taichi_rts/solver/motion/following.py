@@ -61,7 +61,9 @@ class Following(Part, Extra):
             self.follow(now, tick)
 
     def restored(self) -> None:
-        """Lay the walls of the tiles that are kept now."""
+        """Have the grid look at the tiles that are kept now, and lay their walls."""
+        self.grid.divide((int(self.geometry.used[None]) + 1) * TILE)
+        self.grid.restored()
         for wall in self.walls:
             wall.lay()
 
@@ -79,8 +81,10 @@ class Following(Part, Extra):
         """Count the particles around which not all blocks are kept."""
         self.strays[None] = 0
         for i in range(self.particles.alive[None]):
-            if not self.geometry.safe(self.geometry.cell(self.motion.present_position(i, now, tick))):
-                self.strays[None] += 1
+            x = self.motion.present_position(i, now, tick)
+            if self.geometry.has_left(self.grid.cell_of[i], x):
+                if not self.geometry.safe(self.geometry.cell(x)):
+                    self.strays[None] += 1
 
     def follow(self, now: int, tick: float) -> None:
         """Choose the tiles for where particles are at tick `now`, and move what blocks have.
@@ -99,7 +103,6 @@ class Following(Part, Extra):
             (came_from + 1).astype(np.int32), there.astype(np.int32), np.append(0, new_slots).astype(np.int32)
         )
         geometry.keep(keys)
-        self.grid.restored()
         self.restored()
         self.changes += 1
 
