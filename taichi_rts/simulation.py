@@ -11,6 +11,7 @@ from PIL import Image
 
 from taichi_rts.assembly.budget import Budget
 from taichi_rts.assembly.build import assemble
+from taichi_rts.assembly.following import follows
 from taichi_rts.assembly.frame_times import frame_times
 from taichi_rts.assembly.obstacle_forces import Measured
 from taichi_rts.assembly.resources import require
@@ -71,7 +72,7 @@ class Simulation(Readers, Budget, Measured):
         self.scene = scene.with_sound_for(self.stepper)
         require(self.scene, [self.stepper], self.backend, debug=debug)
         self.local = at_origin(self.scene)
-        sampled = sample(self.local)
+        sampled = sample(self.local, walls=not follows(self.local))
         self.solver = assemble(self.local, self.stepper, sampled, self.backend, own, debug=debug)
         self.start_fluids, self.start_viscosities = sampled.fluids, sampled.viscosities
         self.obstacle_layers = sampled.obstacles

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_rts.assembly.following import begin_to_follow, follow, follows
 from taichi_rts.assembly.inventory import parts
 from taichi_rts.assembly.walls import make_keepers, make_walls
 from taichi_rts.device.backend import Backend
@@ -16,6 +17,7 @@ from taichi_rts.sampling.sampling import Sample
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.geometry import Geometry
 from taichi_rts.solver.grid.grid import BlockGrid
+from taichi_rts.solver.grid.tiles import Tiles
 from taichi_rts.solver.grid.windows import FluidWindows, WallWindows
 from taichi_rts.solver.motion.books import Books
 from taichi_rts.solver.motion.inflow import Guide, Inflows, Patch
@@ -52,6 +54,8 @@ def assemble(
     patches = [Patch(scene, number) for number in range(len(scene.inflows))]
     particles = make_particles(scene, start, backend, needs, sum(patch.particles for patch in patches))
     geometry = make_geometry(scene, stepper)
+    if follows(scene):
+        geometry = make_tiles(scene, stepper, particles.capacity)
     past = [Past(particles, geometry)] if particles.has_past else []
     grid = BlockGrid(geometry, particles.capacity, particles.alive)
     sound = SoundRule(scene, particles, grid) if particles.has_sound else None
@@ -82,11 +86,13 @@ def assemble(
     schedule.debug, schedule.sound = debug, sound
     observer = WallObserver(momentum.moving, grid) if momentum.moving else None
     extras: list[Extra] = [extra for extra in (inflows, outlets, sound, observer) if extra is not None]
+    extras += follow(motion, grid, walls)  # last, when it is settled which particles there are
     solver = Solver(
         particles, near, grid, walls, medium, density, motion, timeline, schedule, inflows, outlets, sound, extras
     )
     solver.ticking = parts(solver, Ticking)
     solver.count_in(timeline.tick)
+    begin_to_follow(solver, backend.dtype)
     return solver
 
 
@@ -126,6 +132,12 @@ def make_geometry(scene: Scene, stepper: Stepper, support: float | None = None) 
     """
     support = support or scene.support
     return Geometry(scene.domain.lower, scene.domain.upper, support, stepper.drift * support, scene.is_periodic)
+
+
+def make_tiles(scene: Scene, stepper: Stepper, particles: int) -> Tiles:
+    """Return the same of which only blocks near the `particles` are kept."""
+    support = scene.support
+    return Tiles(scene.domain.lower, scene.domain.upper, support, stepper.drift * support, particles)
 
 
 def make_medium(scene: Scene, start: Sample, particles: FluidState, sound: SoundRule | None) -> Medium:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from taichi_rts.assembly.build import make_geometry, optional_fields
+from taichi_rts.assembly.following import follows
 from taichi_rts.device.backend import Backend
 from taichi_rts.device.fields import Declared, within
 from taichi_rts.scene.checks.size import size_of
@@ -18,11 +19,14 @@ from taichi_rts.scene.geometry.spanning import scene_solid
 from taichi_rts.scene.obstacles.solid import Solid, grid_nodes
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.grid import BlockGrid
-from taichi_rts.solver.grid.windows import FluidWindows, WallWindows, entries, room
+from taichi_rts.solver.grid.tiles import TILE, Tiles, slots_for
+from taichi_rts.solver.grid.windows import RUN, FluidWindows, WallWindows, entries, room
+from taichi_rts.solver.motion.following import Following
 from taichi_rts.solver.motion.outlet import Outlets
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
 from taichi_rts.solver.particles.particles import FluidState
 from taichi_rts.solver.physics.keepers import DistanceTables, RestingKeeper, bin_solids
+from taichi_rts.solver.physics.laid_walls import densest_column, room_for_walls
 from taichi_rts.solver.physics.moving_walls import MovingFace
 from taichi_rts.solver.physics.obstacles import MovingBody
 from taichi_rts.solver.physics.walls import Walls
@@ -57,6 +61,7 @@ class Counts:
         bins: in which obstacles at rest are looked up, and entries in them.
         window: particles that each window on the fluid has room for.
         wall_window: the same of the windows on the wall at rest.
+        slots, rows: of tiles of blocks, and rows of the domain, where the grid follows the particles; else 0.
     """
 
     particles: int
@@ -68,6 +73,8 @@ class Counts:
     bins: tuple[int, int]
     window: int
     wall_window: int
+    slots: int = 0
+    rows: int = 0
 
 
 def count(scene: Scene, stepper: Stepper, spacing: float | None = None) -> Counts:
@@ -77,6 +84,8 @@ def count(scene: Scene, stepper: Stepper, spacing: float | None = None) -> Count
     """
     s, dim = spacing or scene.spacing, scene.dim
     size, support = size_of(scene, spacing), scene.support_ratio * s
+    if follows(scene, spacing):
+        return _count_following(scene, stepper, s, math.ceil(size.particles))
     geometry = make_geometry(scene, stepper, support)
     solids = [scene_solid(scene, obstacle) for obstacle in scene.obstacles]
     lined = [_lining(scene, solid, s) for solid in solids]
@@ -103,6 +112,25 @@ def count(scene: Scene, stepper: Stepper, spacing: float | None = None) -> Count
     )
 
 
+def _count_following(scene: Scene, stepper: Stepper, s: float, particles: int) -> Counts:
+    """Return the counts where grid and walls follow the particles: room for all that so many may need at once."""
+    geometry = make_geometry(scene, stepper, scene.support_ratio * s)
+    slots = slots_for(particles, geometry.shape)
+    return Counts(
+        particles=particles,
+        blocks=slots * TILE,
+        at_rest=room_for_walls(scene, geometry, s, particles) if scene.walls else 0,
+        faces=(),
+        bodies=(),
+        nodes=(0, 0),
+        bins=(0, 0),
+        window=room(scene.dim, math.prod(geometry.sides) / s**scene.dim),
+        wall_window=densest_column(scene, geometry, s) * (RUN + 2),
+        slots=slots,
+        rows=math.prod(geometry.shape[1:]),
+    )
+
+
 def declared_fields(
     scene: Scene, stepper: Stepper, backend: Backend, counts: Counts, *, debug: bool = False
 ) -> dict[str, list[Declared]]:
@@ -119,6 +147,7 @@ def declared_fields(
         "the particles' state": within("particles", FluidState.fields(particles, dim, needs)),
         "the particles' order": within("grid", BlockGrid.order_fields(particles)),
         "the grid and what neighbours see": [
+            *(within("geometry", Tiles.table_fields(counts.slots, counts.rows, dim)) if counts.slots else []),
             *within("grid", BlockGrid.block_fields(particles, blocks, serial=serial)),
             *(within("sound", SoundRule.fields(blocks)) if "sound" in needs else []),
             *within("near", near),
@@ -132,6 +161,7 @@ def declared_fields(
         "steps": [
             *(within("outlets", Outlets.fields(particles)) if scene.outlets else []),
             *within("schedule", stepper.schedule_fields(scene, particles, blocks, serial=serial)),
+            *(within("following", Following.fields(blocks, sound="sound" in needs)) if counts.slots else []),
         ],
     }
     names: set[str] = set()  # because two parts may ask for a field of the grid
@@ -207,8 +237,9 @@ def host_bytes(scene: Scene, *, spacing: float | None = None) -> float:
     size, s = size_of(scene, spacing), spacing or scene.spacing
     solids = [scene_solid(scene, obstacle) for obstacle in scene.obstacles]
     nodes = [math.prod(map(float, grid_nodes(solid.lower, solid.upper, s)[1])) for solid in solids]
+    walls = 0.0 if follows(scene, spacing) else size.walls
     lining = sum(_lining(scene, solid, s) for solid in solids) * scene.dim * LINING
-    return (size.particles + size.walls) * scene.dim * SAMPLING + lining + max(nodes, default=0.0) * TABULATING
+    return (size.particles + walls) * scene.dim * SAMPLING + lining + max(nodes, default=0.0) * TABULATING
 
 
 def _lining(scene: Scene, solid: Solid, spacing: float) -> float:

@@ -106,7 +106,8 @@ class Run(Parts):
         `overhead_fraction` is the share of a full step that is spent for all particles (grid, regions, prediction),
         measured on a sample of the steps. `stopped_by_domain` and `stopped_by_obstacles` count centres that a face of the
         domain or an obstacle had to stop, `removed_by_outlets` particles that each outlet has taken out, `runaways` speeds
-        and accelerations that had to be limited because the run has blown up.
+        and accelerations that had to be limited because the run has blown up. Where the grid follows the particles,
+        `grid_changes` counts how often it changed, and of `blocks_at_most` it keeps `blocks_kept` now.
         """
         said = {
             **self.tally.statistics(),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from taichi_rts.assembly.following import laid_walls
 from taichi_rts.device import backend as backends
 from taichi_rts.sampling.sampling import Sample
 from taichi_rts.scene.geometry.bodies import bodies
@@ -12,6 +13,7 @@ from taichi_rts.scene.obstacles.solid import distance_grid
 from taichi_rts.scene.scene import Scene
 from taichi_rts.solver.grid.geometry import Geometry
 from taichi_rts.solver.grid.grid import BlockGrid
+from taichi_rts.solver.grid.tiles import Tiles
 from taichi_rts.solver.particles.neighbourhood import Neighbourhood
 from taichi_rts.solver.physics.keepers import DistanceTables, MovingKeeper, RestingKeeper
 from taichi_rts.solver.physics.moving_walls import MovingFace
@@ -24,6 +26,8 @@ def make_walls(
 ) -> list[Any]:
     """Return the walls and obstacles at rest as one, if there are any, and each moving face and obstacle."""
     geometry, moving_bodies = grid.geometry, bodies(scene)
+    if isinstance(geometry, Tiles):  # then nothing moves, and there are no obstacles
+        return laid_walls(scene, near, geometry, near.count, backend)
     at_rest = [layer for layer, body in zip(start.obstacles, scene.obstacles, strict=True) if body.motion is None]
     layers = [start.walls.choose(start.owners == number) for number in range(len(scene.moving_walls))]
     rest = start.walls.choose(start.owners == -1)

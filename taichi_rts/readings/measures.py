@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from taichi_rts.assembly.following import follows
 from taichi_rts.medium.medium import Medium
-from taichi_rts.sampling.walls import line_walls
+from taichi_rts.sampling.faces import faces_of, line_walls, no_walls, walls_near
 from taichi_rts.scene.geometry.periodic import nearest_image, periods
 from taichi_rts.scene.near_pairs import near_pairs
 from taichi_rts.scene.parts.conditions import AXES, face_axis
@@ -95,12 +96,10 @@ class FaceForces:
     def __init__(self, scene: Scene, medium: Medium) -> None:
         self.scene = scene
         self.medium = medium
-        self.layer, self.owners = line_walls(scene)
-        x = self.layer.positions
-        self.behind: dict[str, np.ndarray] = {}
-        for d in range(scene.dim):
-            beyond = {"-": x[:, d] < scene.domain.lower[d], "+": x[:, d] > scene.domain.upper[d]}
-            self.behind |= {AXES[d] + side: mask for side, mask in beyond.items() if mask.any()}
+        self.follows = follows(scene)
+        self.lattices = faces_of(scene) if self.follows else []
+        self.layer, self.owners = no_walls(scene) if self.follows else line_walls(scene)
+        self.behind = {face: mask for face, mask in self._behind().items() if mask.any() or self.lattices}
         self.distances = np.linspace(0.0, scene.support, SLOPES)
         self.slopes = np.gradient(medium.kernel.sample(self.distances), self.distances)
 
@@ -109,6 +108,14 @@ class FaceForces:
         """Names of the faces that have a wall, "x-", "x+" and so on."""
         return list(self.behind)
 
+    def _behind(self) -> dict[str, np.ndarray]:
+        """For each face, which wall particles, (M,), lie behind it."""
+        found: dict[str, np.ndarray] = {}
+        x, domain = self.layer.positions, self.scene.domain
+        for d in range(self.scene.dim):
+            found |= {AXES[d] + "-": x[:, d] < domain.lower[d], AXES[d] + "+": x[:, d] > domain.upper[d]}
+        return found
+
     def at(self, time: float, x: np.ndarray, rho: np.ndarray, p: np.ndarray) -> list[float]:
         """Forces [N] (per metre of depth in two dimensions) along the outward normals of `faces` at `time` [s].
 
@@ -116,6 +123,9 @@ class FaceForces:
         """
         if not self.behind:
             return []
+        if self.follows:  # only those near the water: of all there may be millions
+            self.layer = walls_near(self.scene, self.lattices, x.astype(np.float64))
+            self.behind = self._behind()
         forces = self._on_particles(time, x, rho, p)
         return [
             (1.0 if face[1] == "+" else -1.0) * float(forces[mask, face_axis(face)].sum())
@@ -149,6 +159,8 @@ class FaceForces:
         near = np.zeros(len(x), bool)
         for face, mask in self.behind.items():
             d, r = face_axis(face), self.scene.support
+            if not mask.any():
+                continue
             along = places[mask, d]
             near |= x[:, d] < along.max() + r if face[1] == "-" else x[:, d] > along.min() - r
         return near

@@ -32,6 +32,8 @@ class Readers(Run):
     def restored(self) -> None:
         """Take note that fields and values have been put back to what they were at another time."""
         self.grid.restored()
+        for extra in self.solver.extras:
+            extra.restored()
         self._latest = None
 
     def ids(self) -> np.ndarray:

@@ -10,7 +10,8 @@ import numpy as np
 
 from taichi_rts.medium.equation_of_state import Tait
 from taichi_rts.medium.smoothing import lattice_sum, make_kernel
-from taichi_rts.sampling.walls import WallLayer, line_obstacles, line_walls
+from taichi_rts.sampling.faces import line_walls, no_walls
+from taichi_rts.sampling.walls import WallLayer, line_obstacles
 from taichi_rts.scene.fluids.block import Block
 from taichi_rts.scene.fluids.particles import Particles
 from taichi_rts.scene.fluids.shape import FluidShape
@@ -45,8 +46,8 @@ class Sample:
     obstacles: tuple[WallLayer, ...] = ()
 
 
-def sample(scene: Scene) -> Sample:
-    """Fill the scene's fluids with a lattice, but not where obstacles are, and line its walls and obstacles."""
+def sample(scene: Scene, *, walls: bool = True) -> Sample:
+    """Fill the scene's fluids with a lattice, but not where obstacles are, and line its obstacles and, if asked, its walls."""
     rows = fit_rows(scene)
     solids = [scene_solid(scene, obstacle) for obstacle in scene.obstacles]
     positions = [keep_outside(scene, solids, fluid.fill(rows.steps, scene.domain)) for fluid in rows.fluids]
@@ -60,7 +61,7 @@ def sample(scene: Scene) -> Sample:
         np.concatenate(viscosities),
         np.repeat(np.arange(len(positions), dtype=np.int32), [len(x) for x in positions]),
         calibrate_mass(scene),
-        *line_walls(scene),
+        *(line_walls(scene) if walls else no_walls(scene)),
         line_obstacles(scene, solids),
     )
 

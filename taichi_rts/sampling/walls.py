@@ -1,4 +1,4 @@
-"""Wall particles: where they lie behind the domain's faces and inside obstacles, and what volume they have."""
+"""Wall particles: how deep they lie, and what volume they have; and those inside obstacles. Those of the domain: `faces.py`."""
 
 from __future__ import annotations
 
@@ -11,11 +11,8 @@ import numpy as np
 
 from taichi_rts.medium.smoothing import lattice_sum, make_kernel
 from taichi_rts.sampling.lining import line_solid, neighbours, shares
-from taichi_rts.scene.fluids.shape import lattice
 from taichi_rts.scene.geometry.spanning import scene_solid, spans
 from taichi_rts.scene.obstacles.solid import Solid
-from taichi_rts.scene.parts.conditions import AXES
-from taichi_rts.scene.rows import fit_rows
 from taichi_rts.scene.scene import Scene
 from taichi_rts.scene.validation import Vector
 
@@ -64,54 +61,6 @@ class WallLayer:
             volumes=np.concatenate([layer.volumes for layer in layers]),
             depths=np.concatenate([layer.depths for layer in layers]),
         )
-
-
-def line_walls(scene: Scene) -> tuple[WallLayer, np.ndarray]:
-    """Wall particles behind each face of the domain, and (M,), which moving wall each is part of, -1 if of none.
-
-    They lie in `Scene.wall_planes` planes, a spacing apart. Depth and volume come from `calibrate_walls`; along a face the
-    spacing is adapted so that a whole number fits. There are no faces across periodic axes, and no wall behind an inflow.
-    """
-    if not scene.walls or all(scene.is_periodic):
-        nothing = np.zeros((0, scene.dim))
-        return WallLayer(nothing, nothing, np.zeros(0), np.zeros(0), 0.0, 1.0), np.zeros(0, int)
-    numbers: dict[str, int] = {wall.face: number for number, wall in enumerate(scene.moving_walls)}
-    s = scene.spacing
-    depth, _ = calibrate_walls(scene)
-    depths = plane_depths(scene, depth)
-    steps = fit_rows(scene).steps
-    inner, stretch = [], []
-    for low, high, step in zip(scene.domain.lower, scene.domain.upper, steps, strict=True):
-        count = max(1, round((high - low) / s))
-        width = (high - low) / count
-        inner.append(low + (np.arange(count) + 0.5) * width)
-        stretch.append(width / step)
-    positions, normals, volumes, deep, owners = [], [], [], [], []
-    for axis in range(scene.dim):  # the two faces across `axis`; earlier axes' faces own the edges they share
-        if scene.is_periodic[axis]:
-            continue
-        faces = np.concatenate([scene.domain.lower[axis] - depths[::-1], scene.domain.upper[axis] + depths])
-        beyond = [
-            inner[d]
-            if scene.is_periodic[d]
-            else np.concatenate([scene.domain.lower[d] - depths[::-1], inner[d], scene.domain.upper[d] + depths])
-            for d in range(axis + 1, scene.dim)
-        ]
-        positions.append(lattice([*inner[:axis], faces, *beyond]))
-        deep.append(lattice([*inner[:axis], np.concatenate([depths[::-1], depths]), *beyond])[:, axis])
-        share = math.prod(stretch[d] for d in range(scene.dim) if d != axis)
-        volumes.append(np.full(len(positions[-1]), face_volume(scene, steps, axis) * share))
-        behind = positions[-1][:, axis] < scene.domain.lower[axis]
-        normals.append(np.where(behind, 1.0, -1.0)[:, None] * np.eye(scene.dim)[axis])
-        owners.append(np.where(behind, numbers.get(AXES[axis] + "-", -1), numbers.get(AXES[axis] + "+", -1)))
-    x, n, v, d = (np.concatenate(parts) for parts in (positions, normals, volumes, deep))
-    layer = WallLayer(x, n, v, d, depth, wall_stiffness(scene))
-    behind_patches = np.zeros(len(layer.positions), bool)
-    for inflow in scene.inflows:
-        reach = np.where(np.arange(scene.dim) == inflow.axis, depths[-1] + 0.5 * depth, 0.5 * s)
-        first, last = np.asarray(inflow.lower) - reach, np.asarray(inflow.upper) + reach
-        behind_patches |= ((layer.positions >= first) & (layer.positions <= last)).all(axis=1)
-    return layer.choose(~behind_patches), np.concatenate(owners)[~behind_patches]
 
 
 def line_obstacles(scene: Scene, solids: Sequence[Solid]) -> tuple[WallLayer, ...]:

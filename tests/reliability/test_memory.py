@@ -14,6 +14,7 @@ from taichi_rts.device.backend import Backend, ti
 from taichi_rts.device.fields import Declared
 from taichi_rts.sampling.sampling import sample
 from taichi_rts.scene.placing import at_origin
+from taichi_rts.solver.grid.tiles import Tiles
 from taichi_rts.solver.grid.windows import FluidWindows, WallWindows
 from taichi_rts.solver.physics.keepers import DistanceTables, RestingKeeper
 from taichi_rts.solver.physics.moving_walls import MovingFace
@@ -72,6 +73,8 @@ def counted(solver):
         bins=next(((keeper.start.shape[0], keeper.near.shape[0]) for keeper in parts(solver, RestingKeeper)), (0, 0)),
         window=max((windows.capacity for windows in parts(solver, FluidWindows)), default=0),
         wall_window=max((windows.capacity for windows in parts(solver, WallWindows)), default=0),
+        slots=next((tiles.slots for tiles in parts(solver, Tiles)), 0),
+        rows=next((tiles.rows for tiles in parts(solver, Tiles)), 0),
     )
 
 
@@ -106,7 +109,16 @@ CASES = {
     "turning": (POOL | {"obstacles": (STILL, BLADE)}, rts.Regional(), "f64"),
     "rolling": (TANK | {"obstacles": (ROLLER,), "support_ratio": 3.0}, rts.Uniform(), "f32"),
 }
-GRAPHICS = ("uniform", "regional sound", "asynchronous", "turning")
+HALL = {
+    "fluids": (rts.Block((50.0, 50.0), (50.4, 50.4)),),
+    "domain": rts.Box((0.0, 0.0), (100.0, 100.0)),
+    "spacing": 0.04,
+}
+CASES |= {
+    "hall": (HALL, rts.Regional(), "f32"),
+    "hall, regional sound": (HALL | {"sound_speed": "regional"}, rts.Asynchronous(), "f64, debug"),
+}
+GRAPHICS = ("uniform", "regional sound", "asynchronous", "turning", "hall")
 
 
 def check(case, made, backend):
@@ -131,7 +143,7 @@ def test_every_field_is_counted(case, made, start_taichi):
     with start_taichi("cpu", options[:3]) as backend:
         scene, stepper, counts, total = check(case, made, backend)
     estimate = memory.count(scene, stepper)
-    for exact in ("blocks", "nodes", "bins", "window"):
+    for exact in ("blocks", "nodes", "bins", "window", "slots", "rows"):
         assert getattr(estimate, exact) == getattr(counts, exact)
     said = memory.device_bytes(scene.with_sound_for(stepper), stepper, options[:3], debug="debug" in options)
     assert 1.0 <= said / total < 1.35  # wall particles, and the windows on them, are estimated from above

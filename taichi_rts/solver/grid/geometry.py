@@ -1,4 +1,4 @@
-"""How space is cut into blocks and cells."""
+"""How space is cut into blocks and cells, all of which are kept; `tiles.py` keeps some."""
 
 import math
 from collections.abc import Sequence
@@ -20,6 +20,9 @@ class Geometry:
     so that they still lie in neighbouring blocks, and `reach` is how far from a particle its neighbours were sorted in.
 
     Along a `periodic` axis blocks are a little longer, so that a whole number fits, and the first lies beside the last.
+
+    Blocks and cells are numbered with x fastest. What is kept for each lies at its number, and the `blocks` and `cells` there
+    are places for. All else asks for neighbours by `beside`, `across`, `first_cell` and `base_beside`.
     """
 
     def __init__(
@@ -58,6 +61,61 @@ class Geometry:
         self.offsets = [tuple(map(int, offset)) for offset in offsets if offset.any()]
         self.neighbour_strides = [int(np.array(o) @ np.array(self.block_strides)) for o in self.offsets]
         """Index differences to the 8 (26) blocks around a block, where no periodic axis is crossed."""
+
+    @property
+    def across_count(self) -> int:
+        """Number of rows of blocks in and around a row: 9, in two dimensions 3."""
+        return int(3 ** (self.dim - 1))
+
+    @ti.func
+    def number(self, block):
+        """Number of `block` among all of the domain and its margin."""
+        return block
+
+    @ti.func
+    def step(self, block, axis: ti.template()):
+        """How many blocks `block` lies from the first along `axis`, that of the margin."""
+        return (block // self.block_strides[axis]) % self.shape[axis]
+
+    @ti.func
+    def across(self, block, k: ti.template()):
+        """Index of the block across x from `block` in the k-th row in and around its own, on axes that are not periodic."""
+        other = block + (k % 3 - 1) * self.block_strides[1]
+        if ti.static(self.dim == 3):
+            other += (k // 3 - 1) * self.block_strides[2]
+        return other
+
+    @ti.func
+    def run_of(self, block):
+        """Row and column of `block`, which `block_at` and `first_cell` take; in a run along x columns follow each other."""
+        return block // self.shape[0], block % self.shape[0]
+
+    @ti.func
+    def columns_behind(self, column):
+        """How many columns follow on `column` in a row at least."""
+        return self.shape[0] - 1 - column
+
+    @ti.func
+    def block_at(self, row, column):
+        """Index of the block at `column` of `row`."""
+        return row * self.shape[0] + column
+
+    @ti.func
+    def first_cell(self, row, column, above):
+        """First cell of the block at `column` in the row number `above` (0-8, or 0-2) of those in and around `row`."""
+        place = column
+        if ti.static(self.periodic[0]):
+            if place < MARGIN:
+                place += self.inside[0]
+            elif place >= MARGIN + self.inside[0]:
+                place -= self.inside[0]
+        other = self.row_beside(row, above % 3 - 1, above // 3 - 1)
+        return other * self.row_length + place * CELLS_PER_BLOCK
+
+    @ti.func
+    def base_beside(self, cell, dy, dz):
+        """Number to which a column of cells is added for its cell in the row `dy` and `dz` further than that of `cell`."""
+        return self.row_beside(cell // self.row_length, dy, dz) * self.row_length
 
     @ti.func
     def beside(self, block, k: ti.template()):
@@ -133,6 +191,11 @@ class Geometry:
         if ti.static(self.periodic[0]):
             column = ti.min(column, (MARGIN + self.inside[0]) * CELLS_PER_BLOCK - 1)
         return self.row(x) * self.row_length + column
+
+    @ti.func
+    def has_left(self, cell, x):
+        """Whether position `x` [m], (dim,), does not lie in `cell`, or that is negative."""
+        return self.cell(x) != cell
 
     @ti.func
     def row_beside(self, row, dy, dz):

@@ -111,6 +111,11 @@ class BlockGrid(Part):
         self.start.fill(0)
         self.restored()
 
+    def divide(self, blocks: int) -> None:
+        """Take note that only the first `blocks` may hold particles (`Tiles`); to be called before `restored`."""
+        if self.serial:
+            self.resorting.divide(blocks)
+
     def restored(self) -> None:
         """Take note that what is not transient has been put back to what it was at another time."""
         if self.serial:

@@ -113,7 +113,7 @@ class NeighbourSum:
         Return the number of the next occupied block.
         """
         block = self.grid.occupied[m]
-        row, column = block // self.grid.geometry.shape[0], block % self.grid.geometry.shape[0]
+        row, column = self.grid.geometry.run_of(block)
         held = self.open(due, thread, row, column, m, end - m)
         done = ti.max(held - 2, 1)
         number = thread * self.windows.columns
@@ -154,7 +154,7 @@ class NeighbourSum:
         """
         base, number = thread * self.windows.size, thread * self.windows.columns
         n, held = base, 0
-        most = ti.min(most, ti.min(RUN, self.grid.geometry.shape[0] - 1 - column))
+        most = ti.min(most, ti.min(RUN, self.grid.geometry.columns_behind(column)))
         fits = self.windows.count(row, column - 1) <= self.windows.capacity
         while fits:
             n = self.windows.gather(self.copies, row, column - 1 + held, number + held * CELLS_PER_BLOCK, n)
@@ -169,7 +169,7 @@ class NeighbourSum:
         if ti.static(self.has_wall):
             some = 0
             for ahead in range(ti.max(held - 2, 1)):
-                some += self.wall.near[row * self.grid.geometry.shape[0] + column + ahead]
+                some += self.wall.near[self.grid.geometry.block_at(row, column + ahead)]
             if some > 0:
                 end = thread * self.wall.windows.size
                 for side in range(ti.max(held, 3)):

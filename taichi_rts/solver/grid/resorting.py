@@ -4,6 +4,7 @@ from typing import Any
 
 from taichi_rts.device.backend import CHUNK, threads, ti
 from taichi_rts.device.fields import Declared, Part, integers
+from taichi_rts.solver.grid.tiles import Tiles
 
 FEW = 8
 """Only if fewer than one of so many particles have changed their cell there is a list of them; else all are sorted anew."""
@@ -40,10 +41,18 @@ class Resorting(Part):
         self.blocks = grid.geometry.blocks
         self.blocks_each = blocks_in_part(self.blocks)
         self.parts = -(-self.blocks // self.blocks_each)
+        self.divides_some = isinstance(grid.geometry, Tiles)
+        if self.divides_some:
+            self.some_each = ti.field(ti.i32, ())
+            self.divide(self.blocks)
         self.room = listed(count)
         self.make_fields(self.fields(count, self.blocks))
         self.moved_count = ti.field(ti.i32, ())
         self.all_anew = ti.field(ti.i32, ())
+
+    def divide(self, blocks: int) -> None:
+        """Divide the first `blocks` among the parts, and leave what is behind them to the last; `restored` has to follow."""
+        self.some_each[None] = max(1, -(-blocks // max(1, self.parts - 1)))
 
     @staticmethod
     def fields(count: int, blocks: int) -> list[Declared]:
@@ -73,7 +82,7 @@ class Resorting(Part):
             first, changed = turn * BITS, 0
             # Nothing is stored here, so LLVM takes 8 at a time.
             for i in range(first, ti.min(first + BITS, self.grid.alive[None])):
-                differs = self.grid.geometry.cell(locate(i, now, tick)) != self.grid.cell_of[i]
+                differs = self.grid.geometry.has_left(self.grid.cell_of[i], locate(i, now, tick))
                 changed |= ti.cast(differs, ti.i32) << (i - first)
             i = first
             while changed != 0:
@@ -100,9 +109,17 @@ class Resorting(Part):
             self.moved[n] = i
 
     @ti.func
+    def each(self):
+        """How many blocks a part has, but perhaps for the last."""
+        each = self.blocks_each
+        if ti.static(self.divides_some):
+            each = self.some_each[None]
+        return each
+
+    @ti.func
     def part_of(self, cell):
         """Number of the part that `cell` belongs to."""
-        return self.grid.block_of(cell) // self.blocks_each
+        return ti.min(self.grid.block_of(cell) // self.each(), self.parts - 1)
 
     @ti.func
     def sort(self, identity: ti.template()):
@@ -169,8 +186,12 @@ class Resorting(Part):
     @ti.func
     def cells_of(self, part):
         """First cell of a part, and one past its last."""
-        each = self.blocks_each * self.grid.cells_each
-        return part * each, ti.min((part + 1) * each, self.grid.geometry.cells)
+        each, cells = self.each() * self.grid.cells_each, self.grid.geometry.cells
+        first, end = ti.min(part * each, cells), ti.min((part + 1) * each, cells)
+        if ti.static(self.divides_some):
+            if part == self.parts - 1:
+                end = cells
+        return first, end
 
     @ti.func
     def changed(self, first, end):
@@ -222,7 +243,7 @@ class Resorting(Part):
         self.move(done, last, n - done)
         last_block = grid.block_of(end - 1)
         # Where the next block begins is another thread's to write, so the last is asked otherwise.
-        occupied = ti.cast(n + last - done > grid.first(last_block), ti.i32)
+        occupied = ti.cast(first < end and n + last - done > grid.first(last_block), ti.i32)
         for block in range(grid.block_of(first), last_block):
             occupied += ti.cast(not grid.is_empty(block), ti.i32)
         self.occupied_in[part] = occupied
@@ -268,7 +289,8 @@ class Resorting(Part):
                     grid.order[k] = grid.rank[k]
             if first < end:
                 n = self.first_occupied[part]
-                for block in range(part * self.blocks_each, ti.min((part + 1) * self.blocks_each, self.blocks)):
+                first_cell, end_cell = self.cells_of(part)
+                for block in range(grid.block_of(first_cell), grid.block_of(end_cell)):
                     if not grid.is_empty(block):
                         grid.occupied[n] = block
                         n += 1

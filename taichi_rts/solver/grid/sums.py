@@ -25,7 +25,6 @@ def make_neighbour_sum(
     """
     lanes = lanes or backend.lanes
     dtype = backend.dtype
-    row_length = geometry.row_length
 
     @ti.func
     def sum_range(i, low, high):
@@ -47,8 +46,7 @@ def make_neighbour_sum(
     around = geometry.inside[0] * CELLS_PER_BLOCK
 
     @ti.func
-    def sum_row(i, row, low, high):
-        base = row * row_length
+    def sum_row(i, base, low, high):
         total = ti.Vector.zero(dtype, width)
         if ti.static(geometry.periodic[0]):
             total += sum_range(i, start[base + ti.max(low, first)], start[base + ti.min(high, first + around)])
@@ -65,14 +63,13 @@ def make_neighbour_sum(
         total = ti.Vector.zero(dtype, width)
         low = geometry.column(x[0] - geometry.reach)
         high = geometry.column(x[0] + geometry.reach) + 1
-        row = cell // row_length
         if ti.static(geometry.dim == 2):
             for dy in range(-1, 2):
-                total += sum_row(i, geometry.row_beside(row, dy, 0), low, high)
+                total += sum_row(i, geometry.base_beside(cell, dy, 0), low, high)
         else:
             for dz in range(-1, 2):
                 for dy in range(-1, 2):
-                    total += sum_row(i, geometry.row_beside(row, dy, dz), low, high)
+                    total += sum_row(i, geometry.base_beside(cell, dy, dz), low, high)
         return total
 
     return sum_all

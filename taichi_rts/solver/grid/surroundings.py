@@ -21,12 +21,9 @@ class Surroundings:
         self.geometry = grid.geometry
         self.in_runs = grid.serial and not self.geometry.repeats
         self.tasks = TASKS * threads()
-        stride = self.geometry.block_strides
-        beside = [dy * stride[1] for dy in (-1, 0, 1)]
-        if self.geometry.dim == 3:
-            beside = [step + dz * stride[2] for dz in (-1, 0, 1) for step in beside]
-        self.column_strides = [step for step in beside if step != 0]
-        """Index differences to the other blocks of a column across x."""
+        rows = self.geometry.across_count
+        self.others = [k for k in range(rows) if k != rows // 2]
+        """Rows in which the other blocks of a column across x lie."""
 
     @ti.func
     def visit(self, wanted: ti.template(), smallest: ti.template(), rest):
@@ -70,8 +67,8 @@ class Surroundings:
     def column(self, wanted: ti.template(), smallest: ti.template(), block, rest):
         """Reduce what the others in the column across x of `block` have."""
         found = rest
-        for stride in ti.static(self.column_strides):
-            found = self.further(smallest, found, wanted.read(block + stride))
+        for k in ti.static(self.others):
+            found = self.further(smallest, found, wanted.read(self.geometry.across(block, k)))
         return found
 
     @ti.func

@@ -10,8 +10,6 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from taichi_rts.device.backend import Backend, threads, ti
 from taichi_rts.device.counts import CELLS_PER_BLOCK
 from taichi_rts.device.fields import Declared, Part, integers, within
@@ -97,23 +95,11 @@ class Windows(Part):
         return found
 
     @ti.func
-    def cell(self, row, column, above):
-        """First cell of the block at `column` [blocks] in the row of blocks number `above` (0-8) of those around `row`."""
-        place = column
-        if ti.static(self.geometry.periodic[0]):
-            if place < MARGIN:
-                place += self.geometry.inside[0]
-            elif place >= MARGIN + self.geometry.inside[0]:
-                place -= self.geometry.inside[0]
-        other = self.geometry.row_beside(row, above % 3 - 1, above // 3 - 1)
-        return other * self.geometry.row_length + place * CELLS_PER_BLOCK
-
-    @ti.func
     def count(self, row, column):
         """Number of particles in the blocks at `column` in all rows around `row`."""
         total = 0
         for above in range(self.rows):
-            cell = self.cell(row, column, above)
+            cell = self.geometry.first_cell(row, column, above)
             total += self.start[cell + CELLS_PER_BLOCK] - self.start[cell]
         return total
 
@@ -127,7 +113,7 @@ class Windows(Part):
             for above in range(rows):
                 if above == self.rows // 2:
                     self.own_start[number + part] = n
-                cell = self.cell(row, column, above) + part
+                cell = self.geometry.first_cell(row, column, above) + part
                 first, last = self.start[cell], self.start[cell + 1]
                 k = first
                 # Seldom more than once; what is copied beyond `last`, or of an empty cell, the next overwrites.
@@ -209,19 +195,10 @@ class WallWindows(Windows):
     transient = frozenset({"inside"})
 
     def __init__(self, wall: Any) -> None:
-        super().__init__(wall.geometry, wall.start, self.capacity_for(wall), 1)
+        super().__init__(wall.geometry, wall.start, wall.densest_column() * (RUN + 2), 1)
         self.inside = wall.room_for(self.entries)
 
     @classmethod
     def fields(cls, inside: list[Declared]) -> list[Declared]:
         """Declare the fields of windows `inside` which the wall's particles have these."""
         return cls.column_fields() + within("inside", inside)
-
-    @staticmethod
-    def capacity_for(wall: Any) -> int:
-        """Return how many particles the longest run of blocks may have around it."""
-        geometry = wall.geometry
-        counts = np.diff(wall.start.to_numpy()[::CELLS_PER_BLOCK]).reshape(geometry.shape[::-1])
-        for axis in range(geometry.dim - 1):
-            counts = counts + np.roll(counts, 1, axis) + np.roll(counts, -1, axis)
-        return int(counts.max()) * (RUN + 2)

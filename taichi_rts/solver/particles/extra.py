@@ -29,6 +29,9 @@ class Extra:
         """Energy [J] that it has brought among the particles so far, by their number; taken away where negative."""
         return 0.0
 
+    def restored(self) -> None:
+        """All fields that are not transient have been put back to what they were at another time."""
+
     def kept(self, tick: float) -> Any:
         """What a snapshot of the run keeps of it; arrays by particle id."""
         return None

@@ -42,25 +42,34 @@ class Walls(Part):
 
     def __init__(self, layer: WallLayer, fluid: Neighbourhood, geometry: Geometry, backend: Backend) -> None:
         positions, volumes = layer.positions, layer.volumes
-        self.fluid = fluid
-        self.geometry = geometry
-        self.dtype = backend.dtype
-        self.windows: Any = None  # see `windows.py`
-        self.count = len(positions)
+        layered = bool((layer.depths != layer.depth).any())
+        self.make(fluid, geometry, backend, layer.depth, layer.stiffness, len(positions), layered=layered)
         cell = geometry.cell_numpy(positions)
         order = np.argsort(cell, kind="stable")
         start = np.searchsorted(cell[order], np.arange(geometry.cells + 1))
         near = geometry.spread(np.diff(start[::CELLS_PER_BLOCK]) > 0)
-        self.depth = layer.depth
-        self.stiffness = layer.stiffness
-        self.layered = bool((layer.depths != layer.depth).any())
-        padded = self.count + backend.lanes
-        self.make_fields(self.particle_fields(padded, geometry.dim, self.layered), backend.dtype)
-        if self.layered:
+        if layered:
             self.depths.from_numpy(np.pad(layer.depths[order], (0, backend.lanes)).astype(backend.numpy_dtype))
-        self.make_fields(self.block_fields(geometry.blocks))
         sorted_ = (values[order].astype(backend.numpy_dtype) for values in (positions, volumes, layer.normals))
         self.load(*sorted_, start.astype(np.int32), near.astype(np.int32))
+
+    def make(
+        self,
+        fluid: Neighbourhood,
+        geometry: Geometry,
+        backend: Backend,
+        depth: float,
+        stiffness: float,
+        count: int,
+        *,
+        layered: bool,
+    ) -> None:
+        """Make room for `count` wall particles, whose first plane lies `depth` [m] deep; `layered`: in several planes."""
+        self.fluid, self.geometry, self.dtype = fluid, geometry, backend.dtype
+        self.windows: Any = None  # see `windows.py`
+        self.count, self.depth, self.stiffness, self.layered = count, depth, stiffness, layered
+        self.make_fields(self.particle_fields(count + backend.lanes, geometry.dim, layered), backend.dtype)
+        self.make_fields(self.block_fields(geometry.blocks))
 
     @staticmethod
     def particle_fields(entries: int, dim: int, layered: bool) -> list[Declared]:
@@ -84,6 +93,13 @@ class Walls(Part):
             self.start[cell] = start[cell]
         for block in self.near:
             self.near[block] = near[block]
+
+    def densest_column(self) -> int:
+        """Return how many wall particles the blocks in and around one row hold at one column, at most."""
+        counts = np.diff(self.start.to_numpy()[::CELLS_PER_BLOCK]).reshape(self.geometry.shape[::-1])
+        for axis in range(self.geometry.dim - 1):
+            counts = counts + np.roll(counts, 1, axis) + np.roll(counts, -1, axis)
+        return int(counts.max())
 
     def room_for(self, count: int) -> "Walls":
         """Return the same with room for `count` particles, none of which is there yet."""

@@ -81,5 +81,4 @@ class BlockMaxima:
     @ti.func
     def lower(self, block, axis: ti.template()):
         """Lower coordinate [m] of `block` along `axis`."""
-        place = (block // self.geometry.block_strides[axis]) % self.geometry.shape[axis]
-        return self.geometry.lower[axis] + (place - MARGIN) * self.geometry.sides[axis]
+        return self.geometry.lower[axis] + (self.geometry.step(block, axis) - MARGIN) * self.geometry.sides[axis]

@@ -248,7 +248,7 @@ class AsynchronousSchedule(Cells):
     @ti.func
     def noise(self, block):
         """A random number from the stepper's seed and the cell's index."""
-        x = ti.cast(block, ti.u32) * ti.u32(2654435761) + ti.cast(self.seed, ti.u32)
+        x = ti.cast(self.grid.geometry.number(block), ti.u32) * ti.u32(2654435761) + ti.cast(self.seed, ti.u32)
         x = (x ^ (x >> 16)) * ti.u32(2246822519)
         return (x ^ (x >> 13)) & ti.u32(0xFFFF)
 

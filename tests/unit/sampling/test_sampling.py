@@ -3,8 +3,9 @@ import pytest
 
 import taichi_rts as rts
 from taichi_rts.medium.smoothing import make_kernel
+from taichi_rts.sampling.faces import line_walls
 from taichi_rts.sampling.sampling import calibrate_mass, sample
-from taichi_rts.sampling.walls import calibrate_walls, line_walls
+from taichi_rts.sampling.walls import calibrate_walls
 
 S = 0.1
 mediums = pytest.mark.parametrize(

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import taichi_rts as rts
+from taichi_rts.sampling.faces import line_walls
 from taichi_rts.sampling.sampling import compress, fill_patch, patch_steps, sample
-from taichi_rts.sampling.walls import line_walls
 
 UNIT = rts.Box((0, 0), (1, 1))
 POOL = rts.Block((0, 0), (1, 0.4))
