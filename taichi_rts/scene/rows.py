@@ -114,13 +114,13 @@ class _Axis:
             across = self.high - self.low
             step = across / max(1, math.floor(across / s + 0.5))
             if step < CLOSEST * s:
-                step = across / math.floor(across / s)
+                step = across / max(1, math.floor(across / s))
             return step if step <= WIDEST * s else s
         lengths = [b - a for a, b in self.sides]
         largest = sorted(range(len(lengths)), key=lambda k: -self.blocks[k].volume)[:MOST_TRIED]
         even = {lengths[k] / max(1, math.floor(lengths[k] / s + 0.5)) for k in largest}
         choices = [s, *(min(max(step, (1.0 - MOST_FITTED) * s), (1.0 + MOST_FITTED) * s) for step in sorted(even))]
-        choices = [step for step in choices if step <= min(lengths) + self.slack]
+        choices = [step for step in choices if step <= min(lengths) + self.slack] or [s]
 
         def lost(step: float) -> float:
             rounded = [step * math.floor(length / step + 0.5 + SLACK) / length for length in lengths]

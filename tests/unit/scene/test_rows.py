@@ -159,3 +159,9 @@ def test_no_rows_overlap_or_leave_the_domain(seed):
         for d in range(2):
             assert abs(got.lower[d] - asked.lower[d]) <= steps[d] * 1.000001
             assert abs(got.upper[d] - asked.upper[d]) <= steps[d] * 1.000001
+
+
+@pytest.mark.parametrize("spacing", [0.31, 1.0, 1e6, 1e-12])
+def test_an_impossible_spacing_is_still_the_scenes_own_error(spacing):
+    with pytest.raises(rts.SceneError, match=r"spacing: "):
+        scene(rts.Block((0, 0), (1.29, 0.3)), rts.Block((2, 0), (2.57, 0.59))).replace(spacing=spacing)
