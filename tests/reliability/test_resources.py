@@ -178,6 +178,8 @@ def test_a_buffer_beyond_32_bit_addresses_is_refused(monkeypatch):
 def test_a_domain_that_the_water_does_not_fill_is_named(monkeypatch):
     hall = rts.Scene(domain=rts.Box((0, 0, 0), (100, 100, 100)), fluids=[rts.Block((0, 0, 0), (1, 1, 1))], spacing=0.1)
     monkeypatch.setattr(resources, "free_host_memory", lambda: 2.0**30)
+    resources.require(hall, [rts.Uniform()], CPU)  # whose grid follows the water
+    hall = hall.replace(obstacles=[rts.SphereObstacle((50, 50, 50), 1.0)])
     message = (
         r"domain of 100 x 100 x 100 m has 2.6e\+08 cells and its walls, of which the water fills 1e-06: make the domain"
     )

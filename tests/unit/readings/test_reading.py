@@ -15,7 +15,7 @@ SCENE = rts.Scene(
     domain=rts.Box((0, 0), (1, 1)),
     fluids=[rts.Block((0.2, 0.0), (0.4, 0.4))],
     spacing=0.05,
-    end_time=0.1,
+    end_time=0.15,
     inflows=[rts.Inflow((0.8, 1), (0.9, 1), (0, -3))],
     outlets=[rts.Outlet((0.4, 0), (0.6, 0.2))],
 )
