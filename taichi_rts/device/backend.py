@@ -5,6 +5,7 @@ All others import `ti` from here, so that one environment variable chooses a for
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import ctypes
 import ctypes.util
@@ -265,10 +266,21 @@ def _start(name: str, precision: str, options: dict[str, Any]) -> bool:
             ti.init(arch=getattr(ti, name), default_fp=PRECISIONS[precision][0], default_ip=ti.i32, **settings)
     except RuntimeError:
         return False
+    atexit.unregister(_end)
+    atexit.register(_end)
     _POOL.clear()
     if name == "cpu":
         _POOL.append(Pinning(sorted(_thread_ids() - others), threads(), before))
     return True
+
+
+def _end() -> None:
+    """End Taichi with the process: only then does it write the kernels that it has compiled.
+
+    What still refers to a simulation, a traceback for example, would keep Python from doing so by itself.
+    """
+    if ownership.program(ti.lang.impl.get_runtime()) is not None:  # None in a forked child
+        ti.reset()
 
 
 def _thread_ids() -> set[int]:

@@ -73,3 +73,15 @@ def test_the_command_line_warns_in_one_line(tmp_path, home):
     assert done.stderr.count("taichi-rts: warning: compiled kernels are not kept") == 1
     assert "Traceback" not in done.stderr
     assert (tmp_path / "out" / "run.json").is_file()
+
+
+def test_the_command_line_keeps_its_kernels(tmp_path):
+    """Also where something still refers to the simulation as the process ends."""
+    named = NOWHERE | {"XDG_CACHE_HOME": str(tmp_path / "caches")}
+    code = """
+from taichi_rts.commands.main import main
+main("run hydrostatic_column --arch cpu --end-time 0.001 --no-frames --stepper uniform".split())
+"""
+    done = run_program(code, tmp_path, HOME=None, **named)
+    assert done.returncode == 0, done.stderr
+    assert len(list((tmp_path / "caches").rglob("*.tic"))) > 10
