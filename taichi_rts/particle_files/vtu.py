@@ -17,6 +17,7 @@ TYPES = {"f4": "Float32", "f8": "Float64", "i4": "Int32", "i8": "Int64", "u1": "
 DTYPES = {name: np.dtype("<" + code) for code, name in TYPES.items()}
 VERTEX = 1  # VTK's number of this kind of cell
 TIME = "TimeValue"  # the field that ParaView takes for the time of the data
+DIMENSION = "dimension"  # of the scene: positions have three components in any case
 MARK = b'<AppendedData encoding="raw">'
 
 
@@ -34,6 +35,8 @@ def write_vtu(frame: ParticleFrame) -> bytes:
         blobs.extend((np.uint64(len(data)).astype("<u8").tobytes(), data))
         return f'<DataArray type="{kind}" Name={quoteattr(name)}{components} format="appended" offset="{offset}"/>\n'
 
+    # One byte before all others: meshio (5.3) looks for arrays by offsets that it has partly replaced by multiples of 4 already.
+    dimension = appended(DIMENSION, np.array([frame.positions.shape[1]], np.uint8))
     points = appended("Points", arrays.pop("position"))
     data = "".join(appended(name, values) for name, values in arrays.items())
     index = np.int32 if count < 2**31 - 1 else np.int64
@@ -45,7 +48,7 @@ def write_vtu(frame: ParticleFrame) -> bytes:
         '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
         "<UnstructuredGrid>\n"
         f'<FieldData><DataArray type="Float64" Name="{TIME}" NumberOfTuples="1" format="ascii">{frame.time!r}'
-        "</DataArray></FieldData>\n"
+        f"</DataArray>\n{dimension}</FieldData>\n"
         f'<Piece NumberOfPoints="{count}" NumberOfCells="{count}">\n'
         f"<Points>\n{points}</Points>\n<PointData>\n{data}</PointData>\n<Cells>\n{cells}</Cells>\n"
         "</Piece>\n</UnstructuredGrid>\n"

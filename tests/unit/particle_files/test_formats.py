@@ -76,6 +76,23 @@ def test_meshio_reads_vtu(tmp_path, dim):
     assert mesh.field_data["TimeValue"] == [0.125]
 
 
+def test_meshio_reads_vtu_whatever_the_number_of_particles(tmp_path):
+    """It mistakes one array for another where an offset in its copy of the file is one in the file."""
+    meshio = pytest.importorskip("meshio")
+    for count in (*range(1, 40), 1025):
+        numbers = np.arange(count)
+        attributes = {
+            "id": numbers.astype(np.int32),
+            "speed": numbers.astype(np.float32),
+            "fluid": -numbers.astype(np.int32),
+        }
+        content = rts.ParticleFrame(np.outer(numbers, [1.0, 2.0, 3.0]).astype(np.float32), attributes)
+        mesh = meshio.read(written(tmp_path, "vtu", content))
+        np.testing.assert_array_equal(mesh.points, content.positions)
+        for name, values in attributes.items():
+            np.testing.assert_array_equal(mesh.point_data[name], values)
+
+
 def test_meshio_reads_ply(tmp_path):
     meshio = pytest.importorskip("meshio")
     content = frame()
