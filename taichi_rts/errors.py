@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
+
 
 class Error(Exception):
     """Base of all errors that a user can cause; the command line turns it into one line and exit code 2."""
@@ -45,3 +48,9 @@ class Interrupted(KeyboardInterrupt):
 
 class SimulationDivergedError(Error, ArithmeticError):
     """The state stopped being finite."""
+
+
+def did_you_mean(name: object, known: Iterable[str]) -> str:
+    """Return "; did you mean 'x'?" for an unknown `name`, with the nearest of the `known`; "" if none is near."""
+    near = difflib.get_close_matches(str(name), list(known), n=1)
+    return f"; did you mean {near[0]!r}?" if near else ""

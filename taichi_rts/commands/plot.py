@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-import difflib
 import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,7 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from taichi_rts.errors import OutputError
+from taichi_rts.errors import OutputError, did_you_mean
 from taichi_rts.files.writing import write_bytes
 from taichi_rts.trials.plotting import PALETTE, require_plots
 
@@ -130,8 +129,7 @@ def diagrams_of(
         )
     for name in wanted:
         if not _those(known, [name, f"{name}_"]):
-            near = difflib.get_close_matches(name, known, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
+            hint = did_you_mean(name, known)
             raise OutputError(f"no run has a column {name!r}{hint} (there are {', '.join(known)})")
     chosen = known
     if wanted:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 
-from taichi_rts.errors import OutputError, SceneError
+from taichi_rts.errors import OutputError, SceneError, did_you_mean
 from taichi_rts.scene.files.reading import parts_with_files, tomllib
 from taichi_rts.scene.loading import BUILT_IN, scene_names
 
@@ -26,8 +25,7 @@ def copy_scene(name: str, folder: Path) -> list[Path]:
     known = [*scene_names(), *example_names()]
     stem = name.removesuffix(".toml")
     if stem not in known:
-        near = difflib.get_close_matches(stem, known, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
+        hint = did_you_mean(stem, known)
         raise SceneError(f"--copy {name!r} is no scene of this package{hint} (known: {', '.join(known)})")
     source = next(path for path in (BUILT_IN / f"{stem}.toml", EXAMPLES / f"{stem}.toml") if path.is_file())
     data = tomllib.loads(source.read_text(encoding="utf-8"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_rts.errors import OutputError
+from taichi_rts.errors import OutputError, did_you_mean
 from taichi_rts.files.writing import write_bytes
 from taichi_rts.output.turning import UP, UpAxis, rotation_to, turned
 from taichi_rts.particle_files.formats import FORMATS, require_format
@@ -38,8 +37,7 @@ def require_attributes(names: Sequence[str]) -> None:
     """Raise `OutputError` for a name that is no attribute."""
     for name in names:
         if name not in ATTRIBUTES:
-            near = difflib.get_close_matches(name, ATTRIBUTES, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
+            hint = did_you_mean(name, ATTRIBUTES)
             raise OutputError(f"--attributes {name!r} is no attribute; choose from {', '.join(ATTRIBUTES)}{hint}")
 
 

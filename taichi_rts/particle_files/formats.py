@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from taichi_rts.errors import OutputError, SceneError
+from taichi_rts.errors import OutputError, SceneError, did_you_mean
 from taichi_rts.particle_files.bgeo import read_bgeo, write_bgeo
 from taichi_rts.particle_files.frame import ParticleFrame
 from taichi_rts.particle_files.ply import read_ply, write_ply
@@ -58,8 +57,7 @@ READ = {each.suffix: each.read for each in FORMATS.values() if each.read}
 def require_format(name: str, dim: int | None = None) -> Format:
     """Return the format `name`; raises `OutputError` if nothing can be written to it here, or not in `dim` dimensions."""
     if name not in WRITTEN:
-        near = difflib.get_close_matches(name, WRITTEN, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
+        hint = did_you_mean(name, WRITTEN)
         raise OutputError(f"--export {name!r} is no format; choose from {', '.join(WRITTEN)}{hint}")
     found = FORMATS[name]
     if found.package and importlib.util.find_spec(found.package) is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -10,7 +9,7 @@ from typing import Any, Literal, TypedDict, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from taichi_rts.errors import RenderError
+from taichi_rts.errors import RenderError, did_you_mean
 from taichi_rts.readings.levels import milliseconds
 from taichi_rts.readings.reading import Readable, Reading
 from taichi_rts.rendering import legend
@@ -130,8 +129,7 @@ def picture_options(**options: Any) -> PictureOptions:
 def _require(what: str, name: Any, known: Iterable[str]) -> None:
     known = list(known)
     if name not in known:
-        near = difflib.get_close_matches(str(name), known, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
+        hint = did_you_mean(name, known)
         raise RenderError(f"{what} {name!r} is unknown{hint} (known: {', '.join(known)})")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import functools
 import re
 from collections.abc import Callable, Iterable, Sequence
@@ -15,7 +14,7 @@ from PIL import ImageColor
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticKnownError
 
-from taichi_rts.errors import Error
+from taichi_rts.errors import Error, did_you_mean
 
 NAME = r"^[\w()+-][\w .()+-]*$"
 """What a scene may be called: a folder of results gets its name, so it holds no separators."""
@@ -101,8 +100,7 @@ def describe(error: pydantic.ValidationError, subject: str, names: Iterable[str]
         message = item["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
         if item["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
             known = sorted(fields) if keys is None else keys(item["loc"][:-1])
-            near = difflib.get_close_matches(str(item["loc"][-1]), known, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
+            hint = did_you_mean(item["loc"][-1], known)
             message = f"unknown key{hint} (known: {', '.join(known)})"
         elif item["type"] in ("missing", "missing_argument"):
             message = "missing; give it a value"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -11,7 +10,7 @@ from typing import Any, Literal, TypeVar
 import tyro
 from rich.console import Console
 
-from taichi_rts.errors import OutputError
+from taichi_rts.errors import OutputError, did_you_mean
 from taichi_rts.files.writing import remove, require_folder, write_bytes, write_json
 from taichi_rts.solver.stepping.steppers import setups
 from taichi_rts.stability import chart
@@ -130,8 +129,7 @@ def choose(kind: str, names: Sequence[str], known: Sequence[T]) -> list[T]:
     by_name = {each.name: each for each in known}  # type: ignore[attr-defined]
     for name in names:
         if name not in by_name:
-            near = difflib.get_close_matches(name, by_name, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
+            hint = did_you_mean(name, by_name)
             raise OutputError(f"{kind} {name!r} is unknown{hint} (known: {', '.join(by_name)})")
     return [each for name, each in by_name.items() if not names or name in names]
 

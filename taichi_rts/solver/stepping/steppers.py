@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-from taichi_rts.errors import StepperError
+from taichi_rts.errors import StepperError, did_you_mean
 from taichi_rts.solver.stepping.asynchronous import Asynchronous
 from taichi_rts.solver.stepping.base import Setup, Stepper
 from taichi_rts.solver.stepping.regional import Regional
@@ -57,8 +56,7 @@ def as_stepper(stepper: Stepper | str | None) -> Stepper:
         return Regional()
     if isinstance(stepper, str):
         if stepper not in STEPPERS:
-            near = difflib.get_close_matches(stepper, STEPPERS, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
+            hint = did_you_mean(stepper, STEPPERS)
             raise StepperError(f"stepper {stepper!r} is none of {', '.join(STEPPERS)}{hint}")
         stepper = STEPPERS[stepper]()
     if isinstance(stepper, type):
