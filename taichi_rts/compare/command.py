@@ -6,7 +6,6 @@ import dataclasses
 import platform
 import shlex
 import sys
-from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from importlib.metadata import version
 from pathlib import Path
@@ -20,6 +19,7 @@ from taichi_rts.compare.measures import PARTED
 from taichi_rts.compare.runner import COURANTS, Settings, compare, plan
 from taichi_rts.device import forks
 from taichi_rts.errors import Error
+from taichi_rts.output.options import flat
 from taichi_rts.scene.scene import Scene
 from taichi_rts.terminal import Progress, console
 from taichi_rts.trials import executors
@@ -201,18 +201,11 @@ class Compare:
         """Return what the report says about how it was made."""
         return {
             "command": shlex.join(["taichi-rts", *sys.argv[1:]]),
-            "settings": dict(sorted(_options(self))),
+            "settings": {
+                name: str(value) if isinstance(value, Path) else value
+                for name, value, _default in sorted(flat(self), key=lambda option: option[0])
+            },
             "version": version("taichi_rts"),
             "versions": forks.versions() | {"numpy": version("numpy"), "python": platform.python_version()},
             "device": platform.processor() or platform.machine(),
         }
-
-
-def _options(group: Any) -> Iterator[tuple[str, Any]]:
-    """Yield name and plain value of every option of a command, also of those in groups."""
-    for field in dataclasses.fields(group):
-        value = getattr(group, field.name)
-        if dataclasses.is_dataclass(value):
-            yield from _options(value)
-        else:
-            yield field.name, str(value) if isinstance(value, Path) else value
