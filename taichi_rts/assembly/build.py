@@ -53,9 +53,7 @@ def assemble(
     needs = optional_fields(scene, stepper, debug)
     patches = [Patch(scene, number) for number in range(len(scene.inflows))]
     particles = make_particles(scene, start, backend, needs, sum(patch.particles for patch in patches))
-    geometry = make_geometry(scene, stepper)
-    if follows(scene):
-        geometry = make_tiles(scene, stepper, particles.capacity)
+    geometry = make_tiles(scene, stepper, particles.capacity) if follows(scene) else make_geometry(scene, stepper)
     past = [Past(particles, geometry)] if particles.has_past else []
     grid = BlockGrid(geometry, particles.capacity, particles.alive)
     sound = SoundRule(scene, particles, grid) if particles.has_sound else None

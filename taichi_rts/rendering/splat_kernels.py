@@ -117,6 +117,16 @@ def splat(sprite, number, lens, width, height, depth: ti.template(), nearest: ti
 
 
 @ti.func
+def touched_tiles(sprite, width, height, side: ti.template()):
+    """First and last column and row of the tiles of side x side pixels that a sphere's square touches in the picture."""
+    left = ti.max(ti.cast(sprite[0] - sprite[3], ti.i32), 0) // side
+    right = ti.min(ti.cast(sprite[0] + sprite[3], ti.i32), width - 1) // side
+    top = ti.max(ti.cast(sprite[1] - sprite[3], ti.i32), 0) // side
+    bottom = ti.min(ti.cast(sprite[1] + sprite[3], ti.i32), height - 1) // side
+    return left, right, top, bottom
+
+
+@ti.func
 def may_be_seen(sprite, lens, width, height, tiles: ti.template()):
     """Whether a sphere's nearest point is in front of the farthest depth of a tile that it touches."""
     seen = False
@@ -124,10 +134,7 @@ def may_be_seen(sprite, lens, width, height, tiles: ti.template()):
         size = sprite[3] * metres_per_pixel(sprite[2], lens)
         front = ti.bit_cast(sprite[2] - ti.f32(1 + SLACK) * size, ti.i32)
         columns = (width + TILE - 1) // TILE
-        left = ti.max(ti.cast(sprite[0] - sprite[3], ti.i32), 0) // TILE
-        right = ti.min(ti.cast(sprite[0] + sprite[3], ti.i32), width - 1) // TILE
-        top = ti.max(ti.cast(sprite[1] - sprite[3], ti.i32), 0) // TILE
-        bottom = ti.min(ti.cast(sprite[1] + sprite[3], ti.i32), height - 1) // TILE
+        left, right, top, bottom = touched_tiles(sprite, width, height, TILE)
         for row in range(top, bottom + 1):
             for column in range(left, right + 1):
                 if front <= tiles[row * columns + column]:
@@ -156,10 +163,7 @@ def mark_tiles(sprites: Vectors4, count: ti.i32, width: ti.i32, height: ti.i32, 
     for i in range(count):
         sprite = sprites[i]
         if sprite[3] > 0:
-            left = ti.max(ti.cast(sprite[0] - sprite[3], ti.i32), 0) // BROAD
-            right = ti.min(ti.cast(sprite[0] + sprite[3], ti.i32), width - 1) // BROAD
-            top = ti.max(ti.cast(sprite[1] - sprite[3], ti.i32), 0) // BROAD
-            bottom = ti.min(ti.cast(sprite[1] + sprite[3], ti.i32), height - 1) // BROAD
+            left, right, top, bottom = touched_tiles(sprite, width, height, BROAD)
             for row in range(top, bottom + 1):
                 for column in range(left, right + 1):
                     sums[(row + 1) * columns + column + 1] = 1

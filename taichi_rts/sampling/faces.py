@@ -93,7 +93,7 @@ def faces_of(scene: Scene) -> list[Faces]:
     if not scene.walls or all(scene.is_periodic):
         return []
     s, lower, upper = scene.spacing, scene.domain.lower, scene.domain.upper
-    depth, _ = calibrate_walls(scene)
+    depth, volume = calibrate_walls(scene)
     depths = plane_depths(scene, depth)
     steps = fit_rows(scene).steps
     inner, stretch = [], []
@@ -118,7 +118,7 @@ def faces_of(scene: Scene) -> list[Faces]:
                 (*inner[:axis], across, *beyond),
                 np.concatenate([depths[::-1], depths]),
                 across < lower[axis],
-                face_volume(scene, steps, axis) * share,
+                face_volume(scene, steps, axis, depth, volume) * share,
                 depth,
                 wall_stiffness(scene),
             )

@@ -18,7 +18,7 @@ from taichi_rts.scene.fluids.shape import FluidShape
 from taichi_rts.scene.geometry.spanning import scene_solid
 from taichi_rts.scene.obstacles.solid import Solid
 from taichi_rts.scene.parts.conditions import Inflow
-from taichi_rts.scene.rows import fit_rows, is_multiple
+from taichi_rts.scene.rows import Rows, fit_rows, is_multiple
 from taichi_rts.scene.scene import Scene
 from taichi_rts.scene.validation import Vector
 
@@ -50,7 +50,7 @@ def sample(scene: Scene, *, walls: bool = True) -> Sample:
     """Fill the scene's fluids with a lattice, but not where obstacles are, and line its obstacles and, if asked, its walls."""
     rows = fit_rows(scene)
     solids = [scene_solid(scene, obstacle) for obstacle in scene.obstacles]
-    positions = [keep_outside(scene, solids, fluid.fill(rows.steps, scene.domain)) for fluid in rows.fluids]
+    positions = fill(scene, rows, solids)
     moving = [fluid.velocities_at(x) for fluid, x in zip(rows.fluids, positions, strict=True)]
     pressed = [compress(scene, fluid, x) for fluid, x in zip(rows.fluids, positions, strict=True)]
     viscosities = [np.full(len(x), nu) for x, nu in zip(positions, scene.viscosities, strict=False)]
@@ -68,8 +68,11 @@ def sample(scene: Scene, *, walls: bool = True) -> Sample:
 
 def fluid_positions(scene: Scene) -> list[np.ndarray]:
     """Positions [m], (N, dim) each, of the lattice of every fluid."""
-    solids = [scene_solid(scene, obstacle) for obstacle in scene.obstacles]
-    rows = fit_rows(scene)
+    return fill(scene, fit_rows(scene), [scene_solid(scene, obstacle) for obstacle in scene.obstacles])
+
+
+def fill(scene: Scene, rows: Rows, solids: Sequence[Solid]) -> list[np.ndarray]:
+    """Positions [m], (N, dim) each, of every fluid on the lattice `rows`, outside the `solids` of the scene's obstacles."""
     return [keep_outside(scene, solids, fluid.fill(rows.steps, scene.domain)) for fluid in rows.fluids]
 
 

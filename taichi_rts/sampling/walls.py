@@ -163,12 +163,11 @@ def calibrate_walls(scene: Scene) -> tuple[float, float]:
     return near - 0.5 * s, missing(s) / (laid(near) * lattice_sum(kernel, (s,) * dim))
 
 
-def face_volume(scene: Scene, steps: Vector, axis: int) -> float:
+def face_volume(scene: Scene, steps: Vector, axis: int, depth: float, volume: float) -> float:
     """Volume V_b [m^dim] of wall particles at the faces across `axis`, for a fluid whose rows are `steps` [m], (dim,), apart.
 
-    As `calibrate_walls` has it, V S(d) = D m/rho_0, at the depth that it gives.
+    `depth` [m] and `volume` [m^dim] are those of `calibrate_walls`. As it has it, V S(d) = D m/rho_0, at that depth.
     """
-    depth, volume = calibrate_walls(scene)
     if steps == (scene.spacing,) * scene.dim:
         return volume
     across, along = steps[axis], (*steps[:axis], *steps[axis + 1 :])

@@ -141,9 +141,7 @@ class LaidWalls(Walls):
     def load_some(self, x: Rows, volume: Values, normal: Rows, depths: Values, start: Indices):
         """Take these over, of which each cell has its share from `start` on; behind the last cell there is nothing."""
         for b in range(x.shape[0]):
-            self.volume[b] = volume[b]
-            for d in ti.static(range(self.x.n)):
-                self.x[b][d], self.normal[b][d] = x[b, d], normal[b, d]
+            self.take(b, x, volume, normal)
             if ti.static(self.layered):
                 self.depths[b] = depths[b]
         for cell in self.start:

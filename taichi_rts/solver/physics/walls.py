@@ -82,13 +82,18 @@ class Walls(Part):
         """Declare the fields for `blocks` of the grid that the particles are sorted into."""
         return [*integers(blocks * CELLS_PER_BLOCK + 1, "start"), *integers(blocks, "near")]
 
+    @ti.func
+    def take(self, b, x: ti.template(), volume: ti.template(), normal: ti.template()):
+        """Take over place, volume and normal of wall particle `b`."""
+        self.volume[b] = volume[b]
+        for d in ti.static(range(self.x.n)):
+            self.x[b][d], self.normal[b][d] = x[b, d], normal[b, d]
+
     @ti.kernel
     def load(self, x: Rows, volume: Values, normal: Rows, start: Values, near: Values):
         """Take these over; one kernel compiles quicker than many assignments."""
         for b in range(x.shape[0]):
-            self.volume[b] = volume[b]
-            for d in ti.static(range(self.x.n)):
-                self.x[b][d], self.normal[b][d] = x[b, d], normal[b, d]
+            self.take(b, x, volume, normal)
         for cell in self.start:
             self.start[cell] = start[cell]
         for block in self.near:
